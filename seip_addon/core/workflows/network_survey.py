@@ -10,9 +10,10 @@ import numpy as np
 
 from ..choosing.network.frontier import SolvedBudget
 from ..choosing.network.site_problem import SiteProblem, check_problem
+from ..choosing.placement.concave import relative_gap
 from ..choosing.placement.deployment import deploy, pose_prices
 from ..choosing.placement.objective import Objective, Solution, criterion_of, placement_constraints
-from ..choosing.placement.problem import Placement, relative_gap
+from ..choosing.placement.problem import Placement
 from ..errors import SeipError
 from ..progress import Progress
 from ..sensing.returns.occlusion import returns_in_traffic

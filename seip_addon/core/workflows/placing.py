@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Generator, Mapping
 from dataclasses import replace
 
@@ -9,10 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..acceptance import Acceptance, until_accepted
-from ..choosing.placement.cheapest import cheapest_for_coverage
-from ..choosing.placement.deployment import deploy
+from ..choosing.placement.cheapest import cheapest_for_share
+from ..choosing.placement.deployment import Deployment, deploy
+from ..choosing.placement.front import front_of
 from ..choosing.placement.objective import (
     CHOSEN_FOR,
+    MOVED,
+    FrontPoint,
     Objective,
     Solution,
     criterion_of,
@@ -20,21 +24,28 @@ from ..choosing.placement.objective import (
     target_weights,
     with_count,
 )
-from ..choosing.placement.price_front import price_front
+from ..choosing.placement.problem import PlacementProblem
+from ..choosing.placement.returns_summary import ReturnsPoint
 from ..choosing.placement.risk import Risk
 from ..choosing.placement.search_limits import DEFAULT_LIMITS, SolverLimits
 from ..choosing.placement.solver import solve, solve_greedy
 from ..choosing.robustness.gain_band import with_gain_band
 from ..choosing.robustness.pose_error_evaluation import PoseErrorEvaluation
 from ..choosing.robustness.pose_study import PoseStudySettings, pose_message, pose_study
-from ..choosing.robustness.robust_study import robust_study
-from ..choosing.robustness.traffic_study import evaluate_in_traffic, traffic_scenarios, traffic_study
+from ..choosing.robustness.robust_study import RobustPlacements, robust_placements, robust_study
+from ..choosing.robustness.traffic_study import (
+    evaluate_in_traffic,
+    traffic_placements,
+    traffic_scenarios,
+    traffic_study,
+)
 from ..errors import SeipError
 from ..progress import Progress
 from ..sensing.lidar.model import LidarModel
 from ..sensing.scenarios.traffic_instants import spread_instants
+from ..sensing.visibility.surroundings import Surroundings
 from ..site.site import Site
-from .returns import crossing_returns, place_by_returns, with_returns_front
+from .returns import crossing_returns, place_by_returns, returns_problem
 from .survey import Survey, surroundings
 from .traffic_runs import TrafficRuns
 
@@ -55,14 +66,14 @@ def optimise(
     Raises
     ------
     SeipError
-        Same as for `placement_problem`, `solve` and `cheapest_for_coverage`.
+        Same as for `placement_problem`, `solve` and `cheapest_for_share`.
     """
     problem = placement_problem(site, visible, models, objective)
     if objective.coverage is not None:
-        placement = yield from cheapest_for_coverage(problem, objective.coverage, limits)
+        placement = yield from cheapest_for_share(problem, objective.coverage, limits, problem.describe_road)
         greedy = None
     else:
-        placement = yield from solve(problem, limits)
+        placement = yield from solve(problem, limits, describe=problem.describe_road)
         greedy = solve_greedy(problem)
     deployment = deploy(site, models, visible[placement.chosen], placement.chosen)
     return Solution(with_count(objective, site), placement, greedy, deployment)
@@ -91,7 +102,7 @@ def place(
     Raises
     ------
     SeipError
-        Same as for `placement_problem`, `solve`, `solve_robust` and `spread_instants`.
+        Same as for `placement_problem`, `solve` and `spread_instants`.
     """
     measure, scenarios = objective.measure, objective.scenarios
     limits = replace(survey.settings.limits, acceptance=acceptance)
@@ -122,10 +133,32 @@ def with_context(
     acceptance : Acceptance, optional
         User's request to end the search. Other numbers of sensors are then left out.
     """
-    problem = placement_problem(survey.site, survey.grid.visible, survey.models, solution.objective)
-    front = yield from until_accepted(price_front(problem, solution), acceptance, ())
-    solution = yield from until_accepted(with_returns_front(survey, solution), acceptance, solution)
-    return replace(solution, front=front, crossings=crossing_returns(survey, solution))
+    solution = yield from until_accepted(_with_front(survey, solution), acceptance, solution)
+    return replace(solution, crossings=crossing_returns(survey, solution))
+
+
+def _with_front(survey: Survey, solution: Solution) -> Generator[Progress, None, Solution]:
+    """Return a nominal solution with the best placements of fewer and of more sensors."""
+    objective, placement, summary = solution.objective, solution.placement, solution.deployment.returns
+    if placement.status == MOVED or not len(placement.chosen) or objective.measure is not None:
+        return solution
+    problem = placement_problem(survey.site, survey.grid.visible, survey.models, objective)
+    if summary is not None:
+        problem, _, _ = yield from returns_problem(survey, objective)
+    # the bound of a solution holds for its own number of sensors unless a budget or a coverage limits it
+    own = range(len(placement.chosen), (objective.count or 0) + 1)
+    free = objective.budget is None and not objective.cheapest
+    found = yield from front_of(problem, placement, own if free else range(0))
+    whole = math.fsum(problem.weights)
+    if summary is None:
+        points = [
+            FrontPoint(count, one.objective / whole, one.price, (one.bound - one.objective) / whole)
+            for count, one in found.items()
+        ]
+        return replace(solution, front=tuple(points))
+    returns = [ReturnsPoint(count, math.expm1(one.objective), one.price, one.gap) for count, one in found.items()]
+    deployment = replace(solution.deployment, returns=replace(summary, front=tuple(returns)))
+    return replace(solution, deployment=deployment)
 
 
 def _nominal(survey: Survey, objective: Objective, limits: SolverLimits) -> Generator[Progress, None, Solution]:
@@ -142,21 +175,35 @@ def _under_risk(
     site, models, grid = survey.site, survey.models, survey.grid
     around, scenarios = surroundings(survey), objective.scenarios
     problem = placement_problem(site, grid.visible, models, objective)
-    study = yield from robust_study(around, problem, scenarios, [measure], limits)
-    (chosen,) = study.robust
-    poses = chosen.placement.chosen
+    placements = yield from robust_placements(around, problem, scenarios, [measure], limits)
+    placement = placements.robust[measure]
+    poses = placement.chosen
     deployment = deploy(site, models, grid.rows(poses), poses)
+    over = f" over {scenarios.optimised} scenarios" if scenarios.errs else ""
+    name = measure.describe() if scenarios.errs else measure.describe_outcome()
+    notes = (f"{CHOSEN_FOR}for {name}{over}: objective, bound and gap refer to that", *placement.notes)
+    evaluate = _evaluated_under_risk(around, problem, objective, placements, deployment)
+    evaluation = yield from until_accepted(evaluate, limits.acceptance, None)
+    notes += () if evaluation is None else evaluation.messages()
+    return Solution(with_count(objective, site), replace(placement, notes=notes), None, deployment, evaluation)
+
+
+def _evaluated_under_risk(
+    around: Surroundings,
+    problem: PlacementProblem,
+    objective: Objective,
+    placements: RobustPlacements,
+    deployment: Deployment,
+) -> Generator[Progress, None, PoseErrorEvaluation]:
+    """Evaluate placements on held-out scenarios, and the robust one under each kind of pose error."""
+    scenarios = objective.scenarios
+    study = yield from robust_study(around, problem, scenarios, placements)
     under_errors = None
     if scenarios.errs:
         draws = scenarios.evaluated
         settings = PoseStudySettings(scenarios.pose_errors, draws, min(DRAWS_OF_KIND, draws), scenarios.seed + 1)
-        under_errors = yield from until_accepted(pose_study(around, deployment, settings), limits.acceptance, None)
-    evaluation = PoseErrorEvaluation(study, under_errors)
-    over = f" over {scenarios.optimised} scenarios" if scenarios.errs else ""
-    note = f"{CHOSEN_FOR}for {chosen.name}{over}: objective, bound and gap refer to that"
-    notes = (note, *chosen.placement.notes, *evaluation.messages())
-    placement = replace(chosen.placement, notes=notes)
-    return Solution(with_count(objective, site), placement, None, deployment, evaluation)
+        under_errors = yield from pose_study(around, deployment, settings)
+    return PoseErrorEvaluation(study, under_errors)
 
 
 def _in_traffic(
@@ -168,14 +215,17 @@ def _in_traffic(
     problem = placement_problem(site, grid.visible, models, objective)
     instants = spread_instants(runs.optimisation, scenarios.optimised, scenarios.seed)
     views = yield from traffic_scenarios(around, problem, instants)
+    placements = yield from traffic_placements(problem, views, limits, measure)
+    placement = placements["traffic"]
     held_out = spread_instants(runs.evaluation, scenarios.evaluated, scenarios.seed + 1)
-    study = yield from traffic_study(around, problem, views, held_out, limits, measure)
+    evaluate = traffic_study(around, problem, placements, len(instants), held_out)
+    study = yield from until_accepted(evaluate, limits.acceptance, None)
     note = (
         f"{CHOSEN_FOR}to see the road in traffic, {_OVER_INSTANTS[measure.tail]} {len(instants)} "
         "instants: objective, bound and gap refer to that"
     )
-    placement = study.traffic.placement
-    placement = replace(placement, notes=(note, *placement.notes, *study.messages()))
+    messages = () if study is None else study.messages()
+    placement = replace(placement, notes=(note, *placement.notes, *messages))
     deployment = deploy(site, models, grid.rows(placement.chosen), placement.chosen)
     return Solution(with_count(objective, site), placement, None, deployment, study)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Generator
 from dataclasses import replace
 
@@ -10,20 +11,20 @@ import shapely
 from numpy.typing import NDArray
 
 from ..arrays import Float, Integer
+from ..choosing.placement.concave import LOG_RETURNS
 from ..choosing.placement.deployment import deploy
 from ..choosing.placement.objective import (
     CHOSEN_FOR,
     Objective,
     Solution,
-    placement_problem,
+    placement_constraints,
     weights_in_regions,
     with_count,
 )
 from ..choosing.placement.problem import Placement, PlacementProblem
-from ..choosing.placement.returns_front import returns_front
-from ..choosing.placement.returns_solver import greedy_returns, solve_returns
 from ..choosing.placement.returns_summary import CrossingReturns, ReturnsSummary
 from ..choosing.placement.search_limits import SolverLimits
+from ..choosing.placement.solver import solve, solve_greedy
 from ..errors import SeipError
 from ..progress import Progress
 from ..sensing.returns.expected_returns import expected_returns
@@ -45,16 +46,42 @@ def place_by_returns(survey: Survey, objective: Objective, limits: SolverLimits)
     Raises
     ------
     SeipError
-        Same as for `placement_problem` and `solve_returns`.
+        Same as for `placement_problem` and `solve`.
+    """
+    problem, grid, users = yield from returns_problem(survey, objective)
+    origins = survey.site.candidates.xyz
+
+    def describe(chosen: Integer, value: float) -> str:
+        summary = _summarised(grid.returns[chosen], origins[chosen], users, objective)
+        return f"{math.expm1(value):.4g} returns, {summary.describe_each()}"
+
+    placement = yield from solve(problem, limits, describe=describe)
+    return returns_solution(survey, grid, users, objective, (placement, solve_greedy(problem)))
+
+
+def returns_problem(
+    survey: Survey, objective: Objective
+) -> Generator[Progress, None, tuple[PlacementProblem, ReturnsGrid, RoadUsers]]:
+    """State an objective as a problem of returns from road users, whose weights add up to 1.
+
+    Returns
+    -------
+    PlacementProblem
+        Its value is the mean of ln(1 + returns); returns are those left by traffic that hides road users.
+    ReturnsGrid
+        Returns in plain view.
+    RoadUsers
     """
     site, models = survey.site, survey.models
     users = road_users(survey.geometry)
     grid = yield from stored_returns(survey.returns_path, site, users, models, survey.settings.engine)
     returns = returns_in_traffic(grid.returns, site.candidates.xyz, users)
-    problem = _returns_problem(survey, returns, users, objective)
-    placement = yield from solve_returns(problem, returns, limits)
-    greedy = yield from greedy_returns(problem, returns)
-    return returns_solution(survey, grid, users, objective, (placement, greedy))
+    weights = user_weights(users, objective)
+    constraints = vars(placement_constraints(site, models, objective))
+    problem = PlacementProblem(
+        **{**constraints, "weights": weights / math.fsum(weights)}, amounts=returns, g=LOG_RETURNS
+    )
+    return problem, grid, users
 
 
 def returns_solution(
@@ -79,27 +106,6 @@ def returns_solution(
             pedestrian_returns=_near_targets(survey.site.targets, users, grid, chosen),
         ),
     )
-
-
-def with_returns_front(survey: Survey, solution: Solution) -> Generator[Progress, None, Solution]:
-    """Return a solution that was chosen for returns with the returns of other numbers of sensors."""
-    site, models, summary = survey.site, survey.models, solution.deployment.returns
-    if summary is None:
-        return solution
-    users = road_users(survey.geometry)
-    grid = yield from stored_returns(survey.returns_path, site, users, models, survey.settings.engine)
-    returns = returns_in_traffic(grid.returns, site.candidates.xyz, users)
-    problem = _returns_problem(survey, returns, users, solution.objective)
-    front = yield from returns_front(problem, returns, solution)
-    return replace(solution, deployment=replace(solution.deployment, returns=replace(summary, front=front)))
-
-
-def _returns_problem(
-    survey: Survey, returns: NDArray[np.float32], users: RoadUsers, objective: Objective
-) -> PlacementProblem:
-    """Return the problem whose weights are those of the road users."""
-    problem = placement_problem(survey.site, returns > 0, survey.models, objective)
-    return replace(problem, weights=user_weights(users, objective))
 
 
 def crossing_returns(survey: Survey, solution: Solution) -> tuple[CrossingReturns, ...]:

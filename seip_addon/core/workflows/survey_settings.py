@@ -8,8 +8,8 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
+from ..choosing.placement.integer_program import check_solver
 from ..choosing.placement.search_limits import DEFAULT_EFFORT, SolverLimits
-from ..choosing.placement.solvers import check_solver
 from ..sensing.lidar.catalogue import find_models, load_catalogue
 from ..sensing.lidar.model import LidarModel
 from ..sensing.visibility.settings import Engine, VisibilitySettings
@@ -35,7 +35,7 @@ class SurveySettings:
     solver : str
         Solver of integer programs: ``auto``, ``highs``, ``cbc`` or ``gurobi``; ``auto`` is HiGHS if it is installed,
         otherwise CBC.
-    effort : float, units of work, optional
+    effort : float, units of work
         Limit of the counted work of each search, which makes results reproducible: see `SolverLimits`.
     installed_cost : InstalledCost, optional
         Cost of installation to include in every price; by default prices are those of sensors only.
@@ -58,9 +58,9 @@ class SurveySettings:
     catalogue: tuple[Path, ...] = setting((), "catalogues of your own", metavar="FILE")
     engine: Engine = "auto"
     solver: str = setting("auto", "auto (HiGHS if it is installed, otherwise CBC), highs, cbc or gurobi")
-    effort: float | None = setting(
-        None,
-        f"limit of each search in counted work, 1 is about a second of a core ({DEFAULT_EFFORT:g})",
+    effort: float = setting(
+        DEFAULT_EFFORT,
+        "limit of each search in counted work, 1 is about a second of a core",
         metavar="UNITS",
     )
     installed_cost: InstalledCost | None = setting(
@@ -77,7 +77,7 @@ class SurveySettings:
             detects nothing with the required probability.
         """
         check_solver(self.solver)
-        self.limits.clock()  # rejects invalid limits before any ray is cast
+        _ = self.limits  # rejects invalid ones before any ray is cast
         models = find_models(load_catalogue(self.catalogue), self.candidates.sensors)
         for model in models.values():
             self.visibility.least_strength(model)
@@ -110,7 +110,7 @@ class SurveySettings:
             "engine": self.engine,
             "solver": self.solver,
             "installed_cost": self.installed_cost and asdict(self.installed_cost),
-            "effort": self.limits.work,
+            "effort": self.effort,
         }
 
 

@@ -18,8 +18,8 @@ import pulp
 
 from ...arrays import Float
 from ...errors import SeipError
+from ..placement.integer_program import solver_name
 from ..placement.problem import TIE_TOLERANCE
-from ..placement.solvers import solver_name
 from .frontier import Options
 
 _SCALE = 1e4  # of prices and values in the program: far above the solvers' absolute tolerances of 1e-6

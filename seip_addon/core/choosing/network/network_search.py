@@ -10,7 +10,8 @@ import numpy as np
 
 from ...arrays import Float
 from ...progress import Progress
-from ..placement.problem import TIE_TOLERANCE, relative_gap
+from ..placement.concave import relative_gap
+from ..placement.problem import TIE_TOLERANCE
 from .allocation import allocate, allocation_of, relaxed_allocation
 from .frontier import Frontier, SolvedBudget
 

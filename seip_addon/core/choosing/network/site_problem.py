@@ -15,9 +15,9 @@ from ...arrays import Boolean, Float, Integer, Text
 from ...errors import SeipError
 from ...progress import Progress
 from ...storage.array_file import ArrayFile
-from ..placement.cheapest import cheapest_for_coverage
+from ..placement.cheapest import cheapest_for_share
+from ..placement.concave import COVERAGE, LOG_RETURNS
 from ..placement.problem import Placement, PlacementProblem
-from ..placement.returns_solver import solve_returns
 from ..placement.search_limits import SolverLimits
 from ..placement.solver import solve
 from .frontier import Frontier, SolvedBudget, possible_amounts
@@ -119,14 +119,8 @@ class SiteProblem:
             Limit of the search.
         """
         problem = self._problem(budget)
-        search = SolverLimits("auto", effort=effort)
-        if self.criterion == "returns":
-            placement = yield from solve_returns(problem, self.returns, search)
-            whole = 1.0
-        else:
-            placement = yield from solve(problem, search)
-            whole = math.fsum(problem.weights)
-        return self._solved(placement, budget, effort, placement.bound / whole)
+        placement = yield from solve(problem, SolverLimits(effort=effort))
+        return self._solved(placement, budget, effort, placement.bound / math.fsum(problem.weights))
 
     def cheapest(self, coverage: float, effort: float) -> Generator[Progress, None, tuple[SolvedBudget, float]]:
         """Find the cheapest placement that sees a share of the targets; return it with a bound on the least price.
@@ -137,7 +131,7 @@ class SiteProblem:
             The coverage cannot be reached.
         """
         problem = self._problem(None)
-        placement = yield from cheapest_for_coverage(problem, coverage, SolverLimits("auto", effort=effort))
+        placement = yield from cheapest_for_share(problem, coverage, SolverLimits(effort=effort))
         found = self._solved(placement, placement.price, effort, 1.0)
         return replace(found, bound=found.value), max(0.0, placement.bound)
 
@@ -155,7 +149,8 @@ class SiteProblem:
         poses = len(self.prices)
         of_returns = self.criterion == "returns"
         return PlacementProblem(
-            visible=self.returns > 0 if of_returns else self.visible,
+            amounts=self.returns if of_returns else self.visible,
+            g=LOG_RETURNS if of_returns else COVERAGE,
             weights=self.user_weights if of_returns else np.ones(self.visible.shape[1]),
             prices=self.prices,
             positions=self.positions,

@@ -146,8 +146,8 @@ class Rest:
         taken = [self.clique[one] for group, one in zip(self.groups, forced, strict=True) if self._is_single(group)]
         best_first = np.argsort(-net, kind="stable")
         best_first = best_first[net[best_first] > 0]
-        if taken:
-            best_first = best_first[~np.isin(self.clique[best_first], taken)]
+        if forced:
+            best_first = best_first[~np.isin(self.clique[best_first], taken) & ~np.isin(best_first, forced)]
         picked, weakest = [np.array(forced, dtype=np.int64)], np.zeros(len(self.quota))
         for kind, quota in enumerate(self.quota):
             own = best_first[self.kind[best_first] == kind] if len(self.quota) > 1 else best_first
@@ -160,7 +160,7 @@ class Rest:
             free = every[len(forced) :]
             free = free[np.argsort(-net[free], kind="stable")][: max(0, self.count - len(forced))]
             every = np.concatenate([every[: len(forced)], free])
-        if len(forced) or len(every) < sum(map(len, picked)):
+        if forced or len(every) < sum(map(len, picked)):
             weakest[:] = min(0.0, *net[every].tolist()) if len(every) < self.count else float(net[every].min())
         value = math.fsum(net[every]) + (multiplier * self.budget if multiplier else 0.0)
         return Selection(value, every, net, multiplier, weakest[self.kind])
@@ -178,7 +178,8 @@ def rest_of(instance: Instance, chosen: Integer, left: Integer, composition: Com
             groups.append(group)
     count = instance.count - len(chosen)
     spent = math.fsum(instance.price[chosen])
-    quota, kind, budget = (count,), np.zeros(len(left), dtype=np.int64), instance.budget * (1 + TIE_TOLERANCE) - spent
+    quota: tuple[int, ...] = (count,)
+    kind, budget = np.zeros(len(left), dtype=np.int64), instance.budget * (1 + TIE_TOLERANCE) - spent
     if composition is not None:
         used = np.bincount(composition.kind[chosen], minlength=len(composition.quota))
         quota = tuple(int(most - own) for most, own in zip(composition.quota, used, strict=True))
@@ -211,7 +212,7 @@ class Composition:
 
 
 def compositions(instance: Instance) -> list[Composition | None]:
-    """Return compositions, one of which each placement keeps to; a single None if there is no budget or there are many.
+    """Return compositions, one of which each placement keeps to; a single None without a budget or if there are many.
 
     Under a budget the bound of each composition by itself is smaller than that with a multiplier, which mixes them.
     """
@@ -292,8 +293,8 @@ def falling_bounds(
 def least_price(rest: Rest, bound: Bound, goal: float) -> float:
     r"""Return a price below which no placement reaches an objective value.
 
-    With a multiplier :math:`μ > 0` of the price a placement of price P has at most the value :math:`L(μ) + μ P`, so that
-    :math:`P \ge (goal - L(μ)) / μ`.
+    With a multiplier :math:`μ > 0` of the price a placement of price P has at most the value :math:`L(μ) + μ P`, so
+    that :math:`P \ge (goal - L(μ)) / μ`.
     """
     selection = bound.selection
     score = selection.net + selection.multiplier * rest.price
@@ -303,8 +304,8 @@ def least_price(rest: Rest, bound: Bound, goal: float) -> float:
     # the selection changes only where the multiplier passes a ratio of score to price: of many an even spread is tried
     tried = worth[np.linspace(0, len(worth) - 1, min(len(worth), PRICES_TRIED)).astype(np.int64)]
     free = replace(rest, budget=math.inf)
-    prices = []
+    prices = [0.0]
     for multiplier in tried.tolist():
         selected = free._select(score - multiplier * rest.price, 0.0)  # noqa: SLF001 -- of the same module
         prices.append((goal - constant - selected.value) / multiplier)
-    return max([0.0, *prices])
+    return float(max(prices))

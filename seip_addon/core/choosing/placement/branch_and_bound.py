@@ -112,7 +112,7 @@ class BranchAndBound:
         self.incumbent, self.instance, self._block = incumbent, incumbent.instance, block
         self._rounding, self._total = block.rounding, block.value(np.arange(len(block)))
         self._number = self._met = 0
-        self._tried: dict[int, tuple[int, int]] = {}
+        self._tried: dict[int, tuple[int, float]] = {}
         self._open: list[_Node] = []
         self._waiting: list[_Node] = []
         self._goal = -math.inf
@@ -189,7 +189,7 @@ class BranchAndBound:
         heapify(self._open)
         self._note(self.bound)
         if not self._open:
-            incumbent.bound = incumbent.value
+            incumbent.close()
         distance = self.bound - incumbent.value
         self._goal = incumbent.value + GOAL_SHARE * distance if distance > LEAST_GAP * self.bound else -math.inf
         return not self._open
@@ -270,7 +270,11 @@ class BranchAndBound:
         within = np.flatnonzero(reach >= goal)
         if len(within):
             problem = self._restricted(replace(problem, node=node), within)
-            orders = [_Order(problem.rest, one, within, limit) for one in (bound, by_gains)]
+            # With unserved groups, children choose among the members of one: all placements have one of them.
+            first = np.isin(problem.left, problem.first)
+            if len(problem.rest.groups):
+                first = min(problem.rest.groups, key=np.count_nonzero)
+            orders = [_Order(problem.rest, one, within, first, limit) for one in (bound, by_gains)]
             self._branch(problem, min(orders, key=lambda order: order.children(goal)), goal)
 
     def _is_small(self, problem: _Problem) -> bool:
@@ -305,37 +309,27 @@ class BranchAndBound:
 
     def _branch(self, problem: _Problem, order: _Order, goal: float) -> None:
         """Open the children of a node that reach a goal, and let the others wait together."""
-        node, groups = problem.node, problem.rest.groups
+        node, among = problem.node, order.among
         ordered = problem.left[order.candidates]
-        # With unserved groups, children choose among the members of the smallest one: all placements have one of them.
-        among = np.isin(ordered, problem.first)
-        if len(groups):
-            among &= min(groups, key=np.count_nonzero)[order.candidates]
-            rows = np.flatnonzero(among)
-        else:
-            number = order.children(goal)
-            rows = np.flatnonzero(among[:number])
-            if number < len(ordered):
-                waiting = np.sort(ordered[number:]), np.sort(ordered[number:][among[number:]])
-                self._push(replace(node, left=waiting[0], first=waiting[1]), float(order.most[number]))
+        number = order.children(goal)
+        if number < among:
+            left, first = np.sort(ordered[number:]), np.sort(ordered[number:among])
+            self._push(replace(node, left=left, first=first), float(order.most[number]))
         at_once = max(1, MAX_PAIRS // len(ordered))
-        for first in range(0, len(rows), at_once):
-            self._open_children(problem, order, rows[first : first + at_once], among)
+        for begin in range(0, number, at_once):
+            self._open_children(problem, order, np.arange(begin, min(number, begin + at_once)))
 
-    def _open_children(self, problem: _Problem, order: _Order, rows: Integer, among: Boolean) -> None:
+    def _open_children(self, problem: _Problem, order: _Order, rows: Integer) -> None:
         """Open some children of a node.
 
         Parameters
         ----------
         rows : (k,) int64
             Their candidates, as indices into the order.
-        among : (n,) bool
-            Candidates of the order that have, or would have, children of their own.
         """
         rest, block, ordered = problem.rest, problem.block, problem.left[order.candidates]
-        # A child has no candidate whose own child comes before it.
-        later = (np.arange(len(ordered)) > rows[:, None]) | ~among
-        later[np.arange(len(rows)), rows] = False
+        # a child has no candidate whose own child comes before it
+        later = np.arange(len(ordered)) > rows[:, None]
         later &= ~self.instance.conflict[np.ix_(ordered[rows], ordered)]
         most, reach = order.reach(rows)
         if block.has_product:
@@ -353,7 +347,8 @@ class BranchAndBound:
                 self._complete(child.chosen, left, reach[row, own])
             elif block.has_product and rest.count == LISTED:
                 able = own & (reach[row] >= self.incumbent.least_better)
-                self._list_pairs(problem, child, order.candidates[rows[row]], order.candidates[able], values[row] + gains[row, able])
+                members = order.candidates[able]
+                self._list_pairs(problem, child, order.candidates[rows[row]], members, values[row] + gains[row, able])
             else:
                 self._push_unlikely(child, reach[row, own])
                 kept = np.sort(left[reach[row, own] >= max(self._goal, self.incumbent.least_better)])
@@ -438,6 +433,8 @@ class _Order:
     bound : Bound
     within : (n,) int64
         Candidates of the bound that are left.
+    first : (n,) bool
+        Which of them have children of their own; they come first.
     limit : float
         Another bound on all placements of the node.
 
@@ -445,30 +442,40 @@ class _Order:
     ----------
     candidates : (n,) int64
         Indices among those left.
+    among : int
+        Number of those that have children.
     kind : (n,) int64
         Kind of each.
-    most : (n,) float64
+    most : (among,) float64
         Bound on the placements with each candidate and any after it, which never rises along the order.
     multiplier : float
         Multiplier of the budget.
     """
 
-    def __init__(self, rest: Rest, bound: Bound, within: Integer, limit: float) -> None:
+    def __init__(self, rest: Rest, bound: Bound, within: Integer, first: Boolean, limit: float) -> None:
         net = bound.selection.net[within]
-        self.candidates: Integer = np.argsort(-net, kind="stable")
+        self.candidates: Integer = np.lexsort((-net, ~first))
+        self.among = among = int(np.count_nonzero(first))
         self._net, self.multiplier = net[self.candidates], bound.selection.multiplier
         self.kind = rest.kind[self.candidates]
-        largest = self._net.copy()
-        self._weakest = np.zeros((len(net), len(rest.quota)))
+        added = np.maximum(self._net, 0.0)
+        largest = self._net[:among].copy()
+        self._weakest = np.zeros((among, len(rest.quota)))
         for kind, quota in enumerate(rest.quota):
+            # the largest sum of those after each candidate: some of the others, and the next of those with children
             own = self.kind == kind
-            added = np.maximum(self._net[own], 0.0)
-            sums = np.concatenate([[0.0], np.cumsum(added)])
-            begin = np.cumsum(own)  # of those of this kind, the first after each candidate
-            end = begin + np.minimum(quota - own, rest.count - 1)
-            largest += sums[np.minimum(end, len(added))] - sums[begin]
-            full = (end <= len(added)) & (end > begin)
-            self._weakest[full, kind] = added[end[full] - 1]
+            others = _sums(added[among:][own[among:]])
+            sums, begin = _sums(added[:among][own[:among]]), np.cumsum(own[:among])
+            most = np.minimum(quota - own[:among], rest.count - 1)
+            split = [
+                others[number] + sums[np.minimum(begin + most - number, len(sums) - 1)] - sums[begin]
+                for number in range(min(quota, rest.count - 1, len(others) - 1) + 1)
+            ]
+            allowed = [np.where(number <= most, sum_, 0.0) for number, sum_ in enumerate(split)]
+            largest += np.max(allowed, axis=0)
+            end = begin + most
+            full = (end < len(sums)) & (end > begin) & (len(others) == 1)
+            self._weakest[full, kind] = np.diff(sums)[end[full] - 1]
         self.most = np.maximum.accumulate(np.minimum(limit, bound.constant + largest)[::-1])[::-1]
 
     def children(self, goal: float) -> int:
@@ -481,8 +488,13 @@ class _Order:
         return most, most[:, None] - weakest + np.minimum(self._net, weakest)
 
 
+def _sums(values: Float) -> Float:
+    """Return the sums of the first 0, 1, … of some values."""
+    return np.concatenate([[0.0], np.cumsum(values)])
+
+
 def _with_largest(rest: Rest, order: _Order, rows: Integer, value: Float, gains: Float) -> tuple[Float, Float]:
-    """Return values of children (k,) with the largest gains (k, n) of each kind, and with each gain among them (k, n)."""
+    """Return values of children (k,) with the largest gains (k, n) of each kind, and with each gain (k, n) too."""
     most, weakest = value.copy(), np.zeros(gains.shape)
     for kind, quota in enumerate(rest.quota):
         own = np.flatnonzero(order.kind == kind)

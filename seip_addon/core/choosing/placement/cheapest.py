@@ -1,4 +1,6 @@
-"""The cheapest placement that reaches a coverage: partial set covering."""
+"""The cheapest placement that reaches a share of the weight: partial set covering."""
+
+from __future__ import annotations
 
 import math
 from collections.abc import Generator
@@ -9,186 +11,153 @@ import numpy as np
 from ...arrays import Float, Integer
 from ...errors import SeipError
 from ...progress import Progress
-from .bounds import bound_from, can_reach, lagrangian_bound, least_price
-from .branch_and_bound import BestPlacements, is_worthwhile
+from .bounds import bound_at, falling_bounds, least_price, rest_of
 from .feasibility import starting_choice
-from .greedy import drop_redundant, drop_weakest, greedy, greedy_with_swaps, swap_search
-from .integer_program import is_affordable, reaching
+from .incumbent import Incumbent
+from .instance import Instance, make_instance
 from .objective import SAME_PRICE
 from .problem import TIE_TOLERANCE, Placement, PlacementProblem, assess
-from .reduced_problem import Instance, common_unit, make_instance
-from .search_limits import DEFAULT_LIMITS, Clock, SolverLimits
-from .solver import prove, scale_notes, solve_within
-from .solvers import check_solver
+from .search import Search, without_idle
+from .search_limits import DEFAULT_LIMITS, SolverLimits
+from .solver import Describe, search_and_prove
 
-MIN_FINISHING_LIMIT = 1.0  # least limit, seconds or units of work, of the choice among equally cheap placements
+BOUND_STEPS = 100  # steps of the bound on the price of any placement
+FINISHING_SHARE, LEAST_FINISHING = 0.25, 0.5
+"""Share of the work, and least units of it, for the choice among equally cheap placements."""
+UNPROVEN_PRICE = (
+    "the search ended before this placement was proven the cheapest: the gap is the share of its price that another "
+    "one may save"
+)
 
 
-def cheapest_for_coverage(
-    problem: PlacementProblem, coverage: float, limits: SolverLimits = DEFAULT_LIMITS
+def cheapest_for_share(
+    problem: PlacementProblem,
+    share: float,
+    limits: SolverLimits = DEFAULT_LIMITS,
+    describe: Describe | None = None,
 ) -> Generator[Progress, None, Placement]:
     """Choose the cheapest placement that covers a share of all weight.
 
-    Among the cheapest placements the one of largest coverage is returned, and among those the one that `solve` prefers.
-    If all prices are equal, zero included, the number of sensors replaces the price: the placement has the fewest
-    sensors that suffice. The result's objective, bound and gap are prices.
+    Each round searches for a cheaper placement that reaches the share, until there is none or the work is done. Of the
+    cheapest placements the one of largest coverage found is returned. If all prices are equal, zero included, the
+    number of sensors replaces the price. The result's objective, bound and gap are prices.
 
     Parameters
     ----------
-    problem : PlacementProblem
-        Placement problem; its number of sensors and its budget, if given, limit the placement.
-    coverage : float
-        Share of the weight of all targets, above 0 and at most 1.
+    share : float
+        Share of all weight to cover, above 0 and at most 1.
 
     Raises
     ------
     SeipError
-        The coverage cannot be reached, with the highest one that can; or as for `solve`.
+        No placement within the limits reaches the share, or none was found.
     """
-    if not 0 < coverage <= 1:
-        raise SeipError(f"the coverage to reach is {coverage:g}; give a share above 0 and at most 1")
-    solver, clock = limits.solver, limits.clock()
-    check_solver(solver)
-    instance, factor = make_instance(problem)
-    whole = math.fsum(problem.weights) * factor
-    goal = instance.attainable(coverage * whole)
-    chosen = yield from _reaching(problem, instance, goal, whole, solver, clock)
-    chosen = drop_redundant(instance, chosen, goal)
-    if problem.prices.any():
-        cheapest, bound = yield from _cheapest(instance, chosen, goal, solver, clock)
-    else:
-        cheapest, proven = yield from _fewest(instance, chosen, goal, solver, clock)
-        bound = 0.0 if proven else -math.inf
-    finishing = clock.part(clock.elapsed, MIN_FINISHING_LIMIT)  # no longer than it took to find the price
-    best = yield from solve_within(_no_dearer(problem, instance, cheapest), solver, finishing)
-    reached = best.covered * factor >= goal - instance.slack
-    chosen = best.chosen if reached else instance.original[cheapest]
-    return _record(problem, chosen, bound, best, clock)
+    if not 0 < share <= 1:
+        raise SeipError(f"the coverage to reach is {share:g}; give a share above 0 and up to 1")
+    return (yield from _Cheapest(problem, share, limits, describe).solve())
 
 
-def _reaching(
-    problem: PlacementProblem, instance: Instance, goal: float, whole: float, solver: str, clock: Clock
-) -> Generator[Progress, None, Integer]:
-    """Return some placement that reaches the goal."""
-    start = yield from starting_choice(problem, instance, solver)
-    chosen = greedy(instance, start, per_price=bool(instance.price.any()), enough=goal - instance.slack)
-    if instance.value(chosen) >= goal - instance.slack:
-        return chosen
-    first = yield from greedy_with_swaps(instance, start)
-    proof = yield from prove(instance, first, solver, clock)
-    covered = instance.value(proof.chosen)
-    if covered >= goal - instance.slack:
-        return proof.chosen
-    wanted = f"a coverage of {goal / whole:.2%}"
-    if instance.attained(proof.bound) < goal - instance.slack:
-        raise SeipError(
-            f"{wanted} cannot be reached: no placement covers more than {proof.bound / whole:.2%}; "
-            "ask for less, or allow more or better sensors"
-        )
-    raise SeipError(
-        f"no placement with {wanted} was found in {clock.seconds:.0f} s: the best one covers {covered / whole:.2%}; "
-        "ask for less or raise the time limit"
-    )
+class _Cheapest:
+    """Search for the cheapest placement that reaches a goal."""
 
+    def __init__(
+        self, problem: PlacementProblem, share: float, limits: SolverLimits, describe: Describe | None
+    ) -> None:
+        self._problem, self._limits, self._describe = problem, limits, describe
+        self._work = limits.work()
+        self._instance = make_instance(problem)
+        self._whole = math.fsum(problem.weights) / self._instance.unit
+        goal = share * self._whole - self._instance.slack
+        self._goal = math.ceil(goal) if self._instance.step == 1 else goal
+        self._equal_prices = bool(np.ptp(self._instance.price) == 0)
 
-def _cheapest(
-    instance: Instance, chosen: Integer, goal: float, solver: str, clock: Clock
-) -> Generator[Progress, None, tuple[Integer, float]]:
-    """Return the cheapest placement that reaches the goal and a lower bound on the price of any."""
-    price = math.fsum(instance.price[chosen])
-    if price == 0:
-        return chosen, price
-    no_dearer = replace(instance, budget=min(price, instance.budget))
-    keep, bound = yield from lagrangian_bound(no_dearer, goal, clock)
-    least = min(price, max(least_price(instance.of(keep), bound, goal), float(instance.price.min())))
-    if np.ptp(instance.price) == 0:
-        chosen, proven = yield from _fewest(instance, chosen, goal, solver, clock)
-        price = math.fsum(instance.price[chosen])
-        single = float(instance.price[0])
-        return chosen, price if proven else min(price, math.ceil(least / single * (1 - TIE_TOLERANCE)) * single)
-    cheaper = replace(instance, budget=_below(price, instance.price)).of(keep)
-    within = can_reach(cheaper, bound_from(cheaper, bound.targets, bound.groups), goal)
-    keep, cheaper = keep[within], cheaper.part(within)
-    if len(keep) == 0:
-        return chosen, price
-    yield Progress(0, 0, f"looking for a cheaper placement among {len(keep)} candidates")
-    program = reaching(cheaper, goal)
-    outcome = yield from program.maximise(-1 * program.price, solver, clock)
-    if outcome.chosen is not None:
-        chosen, price = keep[outcome.chosen], math.fsum(instance.price[keep[outcome.chosen]])
-    if outcome.finished:
-        return chosen, price
-    return chosen, min(price, max(least, -outcome.bound / program.price_scale))
-
-
-def _fewest(
-    instance: Instance, chosen: Integer, goal: float, solver: str, clock: Clock
-) -> Generator[Progress, None, tuple[Integer, bool]]:
-    """Return a placement of fewest sensors that reaches the goal, and whether that is proven."""
-    # Each round asks for one sensor less, by ever more expensive means: local search, the Lagrangian bound, branch and
-    # bound, an integer program. A placement found at any of them starts the next round. A proof that there is none
-    # ends the stage: the limit on the number includes all smaller numbers.
-    while len(chosen) > 1:
-        fewer = replace(instance, count=len(chosen) - 1)
-        improved = yield from swap_search(fewer, drop_weakest(instance, chosen))
-        if fewer.feasible(improved) and fewer.value(improved) >= goal - instance.slack:
-            chosen = drop_redundant(fewer, improved, goal)
-            continue
-        keep, bound = yield from lagrangian_bound(fewer, fewer.as_good(goal), clock)
-        if bound.value < goal - instance.slack or len(keep) == 0:
-            break
-        yield Progress(0, 0, f"looking for fewer than {len(chosen)} sensors among {len(keep)} candidates")
-        if is_worthwhile(fewer, keep):
-            search = BestPlacements(fewer.part(keep), goal, 1, goal)
-            finished = yield from search.run(clock, clock.left / 2)
-            if search.found:
-                chosen = drop_redundant(fewer, keep[search.found[0]], goal)
-                continue
-            if finished:
+    def solve(self) -> Generator[Progress, None, Placement]:
+        """Find a placement, cheaper ones for as long as there are any, and the one of largest coverage among these."""
+        instance, work = self._instance, self._work
+        chosen = yield from self._reaching()
+        least = yield from self._least_price(chosen)
+        proven = False
+        while not proven and work.left > 0 and (cheaper := self._cheaper(chosen)) is not None:
+            incumbent = Incumbent(cheaper, work.part((1.0 - FINISHING_SHARE) * work.left), self._describe, self._goal)
+            yield from search_and_prove(self._problem, incumbent, self._limits.solver, instance.original[chosen])
+            proven = incumbent.proven
+            if incumbent.value < self._goal:
                 break
-        part = fewer.part(keep)
-        if not is_affordable(part, clock):
-            return chosen, False
-        outcome = yield from reaching(part, goal).maximise_coverage(solver, clock)
-        if outcome.chosen is None:
-            return chosen, outcome.finished
-        chosen = drop_redundant(fewer, keep[outcome.chosen], goal)
-    return chosen, True
+            chosen, proven = without_idle(incumbent, self._goal), False
+        return (yield from self._finished(chosen, least, proven=proven or self._cheaper(chosen) is None))
 
-
-def _below(price: float, prices: Float) -> float:
-    """Return a budget that any lower total price meets, and that is as far below the price as it can be."""
-    unit, whole = common_unit(prices[prices > 0])
-    return price - unit / 2 if whole else price * (1 - 3 * TIE_TOLERANCE)
-
-
-def _no_dearer(problem: PlacementProblem, instance: Instance, cheapest: Integer) -> PlacementProblem:
-    """Return the problem of covering most for the price of the cheapest placement."""
-    if np.ptp(instance.price) == 0 and (instance.price.any() or not problem.prices.any()):
-        return replace(problem, count=len(cheapest))
-    return replace(problem, budget=math.fsum(instance.price[cheapest]))
-
-
-def _record(problem: PlacementProblem, chosen: Integer, bound: float, best: Placement, clock: Clock) -> Placement:
-    price = math.fsum(problem.prices[chosen])
-    optimal = bound >= price * (1 - 3 * TIE_TOLERANCE)
-    notes = [*scale_notes(problem)]
-    if not optimal:
-        notes.append(
-            "the search ended before this placement was proven the cheapest: the gap is the share of its price that "
-            "another one may save"
+    def _reaching(self) -> Generator[Progress, None, Integer]:
+        """Return some placement that reaches the goal: a greedy one by gain per price, or the result of a search."""
+        goal, solver = self._goal, self._limits.solver
+        incumbent = Incumbent(self._instance, self._work.part(self._work.left), self._describe, goal)
+        start = yield from starting_choice(self._problem, self._instance, solver)
+        search = Search(incumbent, start)
+        for power in (1.0, 0.0):
+            incumbent.offer((yield from search.filled(start, power, "choosing greedily", goal)))
+        if incumbent.value < goal:
+            yield from search_and_prove(self._problem, incumbent, solver)
+        if incumbent.value >= goal:
+            return without_idle(incumbent, goal)
+        wanted = f"a coverage of {goal / self._whole:.2%}"
+        if incumbent.proven:
+            raise SeipError(
+                f"{wanted} cannot be reached: no placement covers more than "
+                f"{min(goal, incumbent.bound) / self._whole:.2%}; ask for less, or allow more or better sensors"
+            )
+        raise SeipError(
+            f"no placement with {wanted} was found: the best one covers {max(0.0, incumbent.value) / self._whole:.2%}; "
+            "ask for less or raise the effort"
         )
-    if best.status != "optimal":
-        more = max(0.0, best.bound - problem.covered(chosen)) / math.fsum(problem.weights)
-        points = math.ceil(more * 1000 - 1e-9) / 10
-        notes.append(f"{SAME_PRICE}another one may cover up to {points:.1f} percentage points more")
-    return assess(
-        problem,
-        chosen,
-        max(bound, 0.0),
-        optimal=optimal,
-        solver=best.solver,
-        seconds=clock.seconds,
-        notes=tuple(notes),
-        objective=price,
-    )
+
+    def _cheaper(self, chosen: Integer) -> Instance | None:
+        """Return the instance of placements that are cheaper than a given one; None if there cannot be any."""
+        instance = self._instance
+        if self._equal_prices:
+            return replace(instance, count=len(chosen) - 1) if len(chosen) > 1 else None
+        below = math.fsum(instance.price[chosen]) * (1 - 3 * TIE_TOLERANCE)
+        return replace(instance, budget=min(below, instance.budget)) if below >= instance.price.min() else None
+
+    def _least_price(self, chosen: Integer) -> Generator[Progress, None, float]:
+        """Return a price below which no placement reaches the goal."""
+        instance, goal = self._instance, self._goal
+        block, every, none = instance.blocks[0], np.arange(len(instance)), np.zeros(0, dtype=np.int64)
+        rest = replace(rest_of(instance, none, every), budget=math.fsum(instance.price[chosen]))
+        base: Float = np.zeros(len(block.weight))
+        bound = bound_at(block, rest, base, block.start(base), block.rounding)
+        steps = falling_bounds(block, rest, base, bound, goal, block.rounding)
+        for _, lower in zip(range(BOUND_STEPS), steps, strict=False):
+            bound = lower
+            self._work.spend(block.operations)
+            yield Progress(0, 0, "bounding the price")
+        least = max(least_price(rest, bound, goal), float(instance.price.min()))
+        if self._equal_prices and least > 0:
+            single = float(instance.price[0])
+            least = math.ceil(least / single * (1 - TIE_TOLERANCE)) * single
+        return least
+
+    def _finished(self, chosen: Integer, least: float, *, proven: bool) -> Generator[Progress, None, Placement]:
+        """Return the placement of largest coverage among those as cheap as a given one."""
+        problem, instance, work = self._problem, self._instance, self._work
+        price = math.fsum(instance.price[chosen])
+        same = replace(instance, count=len(chosen)) if self._equal_prices else replace(instance, budget=price)
+        incumbent = Incumbent(same, work.part(max(work.left, LEAST_FINISHING)), self._describe)
+        incumbent.offer(chosen)
+        solver = yield from search_and_prove(problem, incumbent, self._limits.solver, instance.original[chosen])
+        kept = incumbent.chosen
+        cost = math.fsum(instance.price[kept])
+        optimal = proven or least >= cost * (1 - 3 * TIE_TOLERANCE)
+        notes = [] if optimal else [UNPROVEN_PRICE]
+        if not incumbent.proven:
+            more = (incumbent.bound - incumbent.value) * instance.unit / math.fsum(problem.weights)
+            points = math.ceil(1000 * more - 1e-9) / 10
+            notes.append(f"{SAME_PRICE}another one may cover up to {points:.1f} percentage points more")
+        return assess(
+            problem,
+            instance.original[kept],
+            cost if optimal else min(cost, least),
+            optimal=optimal,
+            solver=solver,
+            seconds=work.seconds,
+            notes=tuple(notes),
+            objective=cost,
+        )

@@ -29,7 +29,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import ClassVar, Protocol, Self
+from typing import Any, ClassVar, Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,8 +39,7 @@ from ...arrays import Float, Integer
 ROWS_AT_ONCE = 16  # rows that stay in a processor's cache
 SINGLE_ROUNDING = 1e-5  # share of a sum of single-precision products by which it may be wrong
 DOUBLE_ROUNDING = 1e-11  # the same for double precision
-MAX_UPDATES, UPDATED_SHARE = 100, 0.3  # results that are updates of earlier ones, and share of the targets that may change
-MAX_SINGLE_TOTAL = 20_000.0  # total of whole weights up to which single precision tells sums apart
+MAX_UPDATES, UPDATED_SHARE = 100, 0.3  # updates of earlier results in a row, and share of targets that may change
 
 
 class Concave(Protocol):
@@ -49,8 +48,8 @@ class Concave(Protocol):
     def __call__(self, x: Float) -> Float:
         """Return g(x), of the shape of x."""
 
-    def sum_over(self, amounts: NDArray[np.generic], weight: Float, *, whole: bool) -> ConcaveSum:
-        """Return the sum for amounts (c, t) and weights (t,), which may be whole numbers."""
+    def sum_over(self, amounts: NDArray[Any], weight: Float, *, single: bool) -> ConcaveSum:
+        """Return the sum for amounts (c, t) and weights (t,), in single precision if that is enough."""
 
     def lines(self, most: float) -> tuple[Float, Float]:
         """Return intercepts and slopes (k,) of lines whose minimum is g, or little more, from 0 to ``most``."""
@@ -73,12 +72,12 @@ class Steps:
 
     def __call__(self, x: Float) -> Float:
         """Return g(x)."""
-        value: Float = sum(rise * np.clip(x - level, 0.0, 1.0) for level, rise in enumerate(self.rises))
+        levels = [rise * np.clip(x - level, 0.0, 1.0) for level, rise in enumerate(self.rises)]
+        value: Float = np.sum(levels, axis=0)
         return value
 
-    def sum_over(self, amounts: NDArray[np.generic], weight: Float, *, whole: bool) -> ConcaveSum:
+    def sum_over(self, amounts: NDArray[Any], weight: Float, *, single: bool) -> ConcaveSum:
         """Return the sum; ``amounts`` is (c, t) bool."""
-        single = whole and float(weight.sum()) * sum(self.rises) <= MAX_SINGLE_TOTAL
         return StepSum(amounts.astype(np.float32 if single else np.float64), weight, self)
 
     def lines(self, most: float) -> tuple[Float, Float]:  # noqa: ARG002 -- of the protocol: other functions need it
@@ -103,7 +102,7 @@ class Logarithm:
         value: Float = np.log1p(x)
         return value
 
-    def sum_over(self, amounts: NDArray[np.generic], weight: Float, *, whole: bool) -> ConcaveSum:  # noqa: ARG002 -- of the protocol
+    def sum_over(self, amounts: NDArray[Any], weight: Float, *, single: bool) -> ConcaveSum:  # noqa: ARG002 -- of the protocol
         """Return the sum; ``amounts`` is (c, t) float."""
         return LogSum(np.ascontiguousarray(amounts, dtype=np.float32), weight, self)
 
@@ -145,7 +144,7 @@ class ConcaveSum:
     g : Concave
     """
 
-    amounts: NDArray[np.floating]
+    amounts: NDArray[np.floating[Any]]
     weight: Float
     g: Concave
 
@@ -245,7 +244,7 @@ class _LastGains:
         self.each: Float = np.zeros(0)
         self.gains: Float = np.zeros(0)
         self.uses = 0
-        self.by_target: NDArray[np.floating] | None = None
+        self.by_target: NDArray[np.floating[Any]] | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -315,7 +314,8 @@ class StepSum(ConcaveSum):
     def start(self, base: Float) -> Float:
         """Return lower slopes for targets that many candidates see, as several of those chosen are likely to."""
         del base
-        return -self.g.rises[0] / np.sqrt(np.maximum(1.0, self.amounts.sum(axis=0, dtype=np.float64)))
+        start: Float = -self.g.rises[0] / np.sqrt(np.maximum(1.0, self.amounts.sum(axis=0, dtype=np.float64)))
+        return start
 
     def bound(self, base: Float, parameters: Float) -> tuple[float, Float]:
         """Return the bound, in which each candidate adds the slopes of the targets that it sees."""
@@ -358,7 +358,7 @@ class LogSum(ConcaveSum):
         """A logarithm of each amount."""
         return 5.0 * self.amounts.size
 
-    def _blocks(self) -> Iterator[tuple[slice, NDArray[np.floating]]]:
+    def _blocks(self) -> Iterator[tuple[slice, NDArray[np.floating[Any]]]]:
         for first in range(0, len(self), ROWS_AT_ONCE):
             part = slice(first, first + ROWS_AT_ONCE)
             yield part, self.amounts[part]
@@ -373,7 +373,8 @@ class LogSum(ConcaveSum):
 
     def start(self, base: Float) -> Float:
         """Return somewhat less than the logarithm of the amounts of a good placement."""
-        return 0.8 * np.log1p(base)
+        start: Float = 0.8 * np.log1p(base)
+        return start
 
     def _tangents(self, base: Float, parameters: Float) -> tuple[Float, Float]:
         """Return slopes σ and values C of the tangents at the base."""
@@ -411,4 +412,5 @@ class LogSum(ConcaveSum):
 
     def clipped(self, base: Float, parameters: Float) -> Float:
         """Return parameters of at least ln(1 + base)."""
-        return np.maximum(parameters, self.lowest(base))
+        clipped: Float = np.maximum(parameters, self.lowest(base))
+        return clipped

@@ -68,9 +68,7 @@ def _least(part: Instance, solver: str, *, by_price: bool = False) -> Generator[
     return (yield from _decide(program, -1 * (program.price if by_price else program.number), solver))
 
 
-def _decide(
-    program: PlacementProgram, objective: Expression, solver: str
-) -> Generator[Progress, None, Integer | None]:
+def _decide(program: PlacementProgram, objective: Expression, solver: str) -> Generator[Progress, None, Integer | None]:
     """Return the choice of largest objective that is feasible in exact arithmetic, or None where there is none."""
     while True:
         outcome = yield from program.maximise(objective, solver, Work(math.inf))

@@ -22,7 +22,9 @@ class Incumbent:
     work : Work
         Limit of the search.
     describe : callable, optional
-        Description of candidates of the problem for the user, such as "71 % of the road".
+        Description for the user, such as "71% of the road", of candidates of the problem and their objective value.
+    goal : float
+        Value that only is of interest: the search ends once it is reached.
 
     Attributes
     ----------
@@ -34,19 +36,29 @@ class Incumbent:
         Upper bound on the value of any placement.
     """
 
-    def __init__(self, instance: Instance, work: Work, describe: Callable[[Integer], str] | None = None) -> None:
+    def __init__(
+        self,
+        instance: Instance,
+        work: Work,
+        describe: Callable[[Integer, float], str] | None = None,
+        goal: float = -math.inf,
+    ) -> None:
         self.instance, self.work = instance, work
-        self._describe = describe
+        self._describe, self._goal = describe, goal
         self.chosen: Integer = np.zeros(0, dtype=np.int64)
         self.value, self.bound, self.best = -math.inf, math.inf, ""
 
     @property
     def least_better(self) -> float:
         """Least value of a better placement: lower bounds than this are proof enough."""
-        return self.value + self.instance.step
+        return max(self.value + self.instance.step, self._goal)
+
+    def close(self) -> None:
+        """Record that no placement is better."""
+        self.bound = max(self.value, self.least_better - self.instance.step)
 
     def offer(self, chosen: Integer) -> bool:
-        """Take a placement if it is feasible and better: of a larger value, or as good with fewer or cheaper sensors."""
+        """Take a placement if it is feasible and of a larger value, or as good with fewer or cheaper sensors."""
         chosen = np.sort(np.asarray(chosen, dtype=np.int64))
         if not self.instance.feasible(chosen):
             return False
@@ -56,8 +68,10 @@ class Incumbent:
         ):
             return False
         self.chosen, self.value = chosen, value
+        if value >= self._goal > -math.inf:
+            self.work.end()
         if self._describe is not None:
-            self.best = self._describe(self.instance.original[chosen])
+            self.best = self._describe(self.instance.original[chosen], value * self.instance.unit)
         return True
 
     @property

@@ -18,6 +18,8 @@ from .risk import NOMINAL, Risk
 
 MICROMETRE = 1e-6  # metres; posts may be closer than the minimum distance by less than this, as positions are rounded
 MAX_EXACT = 2.0**52  # sums of whole numbers up to here are exact in double precision
+MAX_SINGLE_TOTAL = 20_000.0  # total of whole weights up to which single precision tells sums apart
+MAX_DOUBLE = 20_000_000  # entries of A up to which several blocks together are kept in double precision
 WHOLE_SLACK = 0.25  # whole weights differ by one or not at all
 DENOMINATORS = range(1, 13)  # a common unit of all weights is sought among these parts of the smallest one
 
@@ -90,6 +92,11 @@ class Instance:
         """The same for gains that follow others of similar placements."""
         return sum(block.update_operations for block in self.blocks)
 
+    @property
+    def is_plain(self) -> bool:
+        """Whether the objective is the value of a single block without failures."""
+        return len(self.blocks) == 1 and self.risk.failure == "none"
+
     def affordable(self, price: Float | float) -> Boolean | bool:
         """Return whether a total price is within the budget, except for rounding."""
         return price <= self.budget * (1 + TIE_TOLERANCE)
@@ -161,18 +168,20 @@ class Instance:
         """
         used = np.flatnonzero(shares)
         blocks = [self.blocks[k] for k in used]
-        weight = np.concatenate([shares[k] * self.blocks[k].weight for k in used])
+        weight: Float = np.concatenate([shares[k] * self.blocks[k].weight for k in used])
         g = blocks[0].g
         if self.risk.failure != "none":
             weight, g = weight / self.count, Steps((self.count - 1.0, 1.0))
         if len(blocks) == 1 and self.risk.failure == "none":
-            return blocks[0]
-        amounts = np.concatenate([block.amounts for block in blocks], axis=1)
-        return g.sum_over(amounts, weight, whole=False)
+            only: ConcaveSum = blocks[0]
+            return only
+        amounts, weight = _merged(np.concatenate([block.amounts > 0 for block in blocks], axis=1), weight)
+        relaxed: ConcaveSum = g.sum_over(amounts, weight, single=amounts.size > MAX_DOUBLE)
+        return relaxed
 
 
 def make_instance(
-    problem: PlacementProblem, cases: Sequence[NDArray[np.generic]] | None = None, risk: Risk = NOMINAL
+    problem: PlacementProblem, cases: Sequence[NDArray[Any]] | None = None, risk: Risk = NOMINAL
 ) -> Instance:
     """Reduce a problem to the candidates and targets that matter.
 
@@ -207,6 +216,8 @@ def make_instance(
     exact = whole and len(parts) == 1 and risk.failure != "mean"
     if whole and not exact:
         slack = min(TIE_TOLERANCE * total, WHOLE_SLACK / (risk.counted(len(parts)) * problem.most_sensors))
+    # of several blocks only the search needs gains, and it evaluates each placement exactly
+    single = len(parts) > 1 or (exact and total <= MAX_SINGLE_TOTAL)
     return Instance(
         price=problem.prices[order[needed]],
         conflict=conflict[np.ix_(needed, needed)],
@@ -215,7 +226,7 @@ def make_instance(
         original=order[needed],
         count=problem.most_sensors,
         budget=math.inf if problem.budget is None else float(problem.budget),
-        blocks=tuple(problem.g.sum_over(amounts, weight, whole=exact) for amounts, weight in parts),
+        blocks=tuple(problem.g.sum_over(amounts, weight, single=single) for amounts, weight in parts),
         risk=risk,
         unit=unit,
         slack=slack,
@@ -239,7 +250,7 @@ def common_unit(weights: Float) -> tuple[float, bool]:
     return 1.0, False
 
 
-def _merged(amounts: NDArray[np.generic], weight: Float) -> tuple[NDArray[np.generic], Float]:
+def _merged(amounts: NDArray[Any], weight: Float) -> tuple[NDArray[Any], Float]:
     """Drop targets without weight or amounts; merge those that the same candidates see, (c, m) and (m,)."""
     used = np.flatnonzero((weight > 0) & (amounts > 0).any(axis=0))
     amounts, weight = amounts[:, used], weight[used]
@@ -248,7 +259,7 @@ def _merged(amounts: NDArray[np.generic], weight: Float) -> tuple[NDArray[np.gen
     packed = np.ascontiguousarray(np.packbits(amounts, axis=0).T)
     keys = packed.view(np.dtype((np.void, packed.shape[1])))[:, 0]
     _, first, group = np.unique(keys, return_index=True, return_inverse=True)
-    return amounts[:, first], np.bincount(group.ravel(), weight)
+    return amounts[:, first], np.bincount(group.ravel(), weight).astype(np.float64)
 
 
 def _conflicts(positions: Integer, xyz: Float, min_distance: float) -> Boolean:

@@ -213,9 +213,7 @@ class ConcaveProgram(PlacementProgram):
             self.model += v <= math.log1p(at) - at / (1.0 + at) + x / (1.0 + at)
 
 
-def prove_by_program(
-    incumbent: Incumbent, among: Integer, solver: str, work: Work
-) -> Generator[Progress, None, bool]:
+def prove_by_program(incumbent: Incumbent, among: Integer, solver: str, work: Work) -> Generator[Progress, None, bool]:
     """Find better placements of some candidates by an integer program until there is none, or the work is done.
 
     Solvers have tolerances: of two placements that differ by less they may return either. So each placement that a
@@ -239,7 +237,7 @@ def prove_by_program(
             return False
         outcome = yield from program.maximise(program.objective, solver, work, program.entries)
         if outcome.chosen is None and outcome.finished:
-            incumbent.bound = incumbent.value
+            incumbent.close()
             return True
         incumbent.bound = min(incumbent.bound, outcome.bound / program.scale + program.margin)
         if incumbent.bound < incumbent.least_better:

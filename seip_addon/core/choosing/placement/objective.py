@@ -338,7 +338,7 @@ def placement_problem(
     SeipError
         The objective contradicts itself or the site.
     """
-    return PlacementProblem(visible=visible, **vars(placement_constraints(site, models, objective)))
+    return PlacementProblem(amounts=visible, **vars(placement_constraints(site, models, objective)))
 
 
 def placement_constraints(site: Site, models: Mapping[str, LidarModel], objective: Objective) -> PlacementConstraints:

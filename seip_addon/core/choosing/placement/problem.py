@@ -140,9 +140,9 @@ class PlacementProblem(PlacementConstraints):
         \sum_i x_i \le N, \quad \sum_i p_i x_i \le C, \quad x_i \in \{0, 1\},
 
     with at most one pose per position, at least one pose of each mandatory group, and no two poses closer than the
-    minimum distance. With A the visibility of the road and :math:`g(x) = \min(x, 1)` it is the maximal covering location
-    problem (Church and ReVelle 1974), vanilla if all weights are the same; with A the expected returns from road users
-    :math:`g(x) = \ln(1 + x)`.
+    minimum distance. With A the visibility of the road and :math:`g(x) = \min(x, 1)` it is the maximal covering
+    location problem (Church and ReVelle 1974), vanilla if all weights are the same; with A the expected returns from
+    road users :math:`g(x) = \ln(1 + x)`.
 
     Over scenarios k with amounts :math:`A^k` (pose errors, instants of traffic) the objective is the mean of the m
     smallest of the K sums
@@ -186,6 +186,11 @@ class PlacementProblem(PlacementConstraints):
     def value(self, chosen: Integer) -> float:
         """Return the objective value of chosen candidates: for coverage, the weight that they cover."""
         return math.fsum(self.weights * self.g(self.amounts[chosen].sum(axis=0, dtype=np.float64)))
+
+    def describe_road(self, chosen: Integer, value: float) -> str:
+        """Describe a value of coverage for the user; see `solve`."""
+        del chosen
+        return f"{value / math.fsum(self.weights):.2%} of the road"
 
     @property
     def nothing_added(self) -> str:
@@ -275,4 +280,3 @@ def assess(  # noqa: PLR0913 -- the fields of one record
         price=math.fsum(problem.prices[chosen]),
         notes=notes,
     )
-

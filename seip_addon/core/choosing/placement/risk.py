@@ -77,11 +77,6 @@ class Risk:
         return f"coverage{lost}"
 
     @property
-    def is_nominal(self) -> bool:
-        """Whether this is the value of a single scenario without failures."""
-        return self == NOMINAL
-
-    @property
     def alone(self) -> Risk:
         """Return the same measure for a single scenario, by which each draw is evaluated."""
         return replace(self, tail=1.0)

@@ -14,10 +14,11 @@ import numpy as np
 from ...arrays import Float, Integer
 from ...progress import Progress
 from .incumbent import Incumbent
+from .problem import TIE_TOLERANCE
 
 PATIENCE = 80
 """Restarts without a better placement after which the search ends, in addition to as many as led to the best one."""
-TOLERATED_LOSS, RETURN = 0.005, 10  # share of the value that a restart may lose, and restarts between those from the best
+TOLERATED_LOSS, RETURN = 0.005, 10  # share of the value that a restart may lose; restarts between those from the best
 FIRST_CHOICES = 20  # candidates of largest gain, one of which begins a restart
 PRICE_POWERS = (0.0, 0.5, 1.0, 1.5)
 """Powers of the price by which gains are divided: different ones lead to different mixtures of prices."""
@@ -43,7 +44,8 @@ class Search:
         instance = self.instance
         mixed = math.isfinite(instance.budget) and np.ptp(instance.price) > 0
         self.powers = PRICE_POWERS if mixed else (0.0,)
-        self._divisors = {power: np.maximum(instance.price, 1e-9 * instance.price.max()) ** power for power in self.powers}
+        price = np.maximum(instance.price, TIE_TOLERANCE * max(float(instance.price.max()), TIE_TOLERANCE))
+        self._divisors = {power: price**power for power in (*self.powers, 1.0)}
 
     def first(self) -> Steps:
         """Find a first placement: the best of greedy choices by gain and by gain per price."""
@@ -79,7 +81,8 @@ class Search:
     def _restarted(self, best: Integer) -> Generator[Progress, None, Integer]:
         """Drop a random part of a placement, add another candidate, and fill up greedily."""
         random, instance = self._random, self.instance
-        dropped = random.choice(best, random.integers(1, max(2, (len(best) + 1) // 2 + 1)), replace=False) if len(best) else best
+        number = min(len(best), random.integers(1, (len(best) + 1) // 2 + 1, endpoint=True))
+        dropped = random.choice(best, number, replace=False) if number else best
         kept = np.setdiff1d(best, dropped)
         power = self.powers[random.integers(len(self.powers))]
         gain = np.where(instance.addable(kept), self._rated(kept, power), -np.inf)
@@ -90,10 +93,12 @@ class Search:
             kept = np.append(kept, random.choice(first))
         return (yield from self.filled(kept, power))
 
-    def filled(self, chosen: Integer, power: float, phase: str = "improving") -> Generator[Progress, None, Integer]:
-        """Add the candidate of largest gain, by a power of the price, until none can be added."""
+    def filled(
+        self, chosen: Integer, power: float, phase: str = "improving the placement", enough: float = math.inf
+    ) -> Generator[Progress, None, Integer]:
+        """Add the candidate of largest gain, by a power of the price, until none can be added or a value is reached."""
         instance = self.instance
-        while self.incumbent.work.left > 0 or len(chosen) == len(self.start):
+        while (self.incumbent.work.left > 0 or self.incumbent.value == -math.inf) and instance.value(chosen) < enough:
             addable = instance.addable(chosen)
             if not addable.any():
                 break
@@ -175,11 +180,18 @@ class Search:
         return max((chosen[chosen != one] for one in chosen), key=self.instance.value)
 
 
-def without_idle(incumbent: Incumbent) -> Integer:
-    """Return the best placement without sensors, the dearest first, that neither value nor mandatory groups need."""
+def without_idle(incumbent: Incumbent, least: float | None = None) -> Integer:
+    """Return the best placement without sensors, the dearest first, that neither value nor mandatory groups need.
+
+    Parameters
+    ----------
+    least : float, optional
+        Value that must remain; by default that of the placement.
+    """
     instance, chosen = incumbent.instance, incumbent.chosen
+    least = incumbent.value if least is None else least
     for one in chosen[np.argsort(-instance.price[chosen], kind="stable")]:
         rest = chosen[chosen != one]
-        if instance.feasible(rest) and instance.value(rest) >= incumbent.value - instance.slack:
+        if instance.feasible(rest) and instance.value(rest) >= least - instance.slack:
             chosen = rest
     return chosen

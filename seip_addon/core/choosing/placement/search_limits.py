@@ -94,6 +94,10 @@ class Work:
         """Return a part of what is left."""
         return Work(min(most, self.left), self._acceptance, self)
 
+    def end(self) -> None:
+        """Leave nothing of this part."""
+        self._effort = min(self._effort, self.done)
+
     @property
     def left(self) -> float:
         """Units of work until the limit, negative after it or once the user has accepted what was found."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Generator, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,14 +30,15 @@ PROGRAM_SHARE = 0.5  # share of what is left then for an integer program
 TIGHT_GAP = 0.01  # largest gap at which an integer program is tried without being asked for
 UNPROVEN = "the search ended before this placement was proven optimal: the gap is the most by which it may fall short"
 
-Describe = Callable[[Integer], str]
+Describe = Callable[[Integer, float], str]
+"""Description for the user of candidates and their objective value."""
 
 
 def solve(
     problem: PlacementProblem,
     limits: SolverLimits = DEFAULT_LIMITS,
     *,
-    cases: Sequence[NDArray[np.generic]] | None = None,
+    cases: Sequence[NDArray[Any]] | None = None,
     risk: Risk = NOMINAL,
     known: Integer | None = None,
     describe: Describe | None = None,
@@ -60,7 +62,7 @@ def solve(
     known : (k,) int64, optional
         Candidates of a placement of this problem, or of one with other limits, to begin from besides.
     describe : callable, optional
-        Description of candidates' value for reports on progress.
+        Description of the best placement for reports on progress.
 
     Raises
     ------
@@ -92,7 +94,7 @@ def search_and_prove(
     yield from search.restarts(RESTART_SHARE * work.left)
     rest, part = branches.left(), work.part(PROGRAM_SHARE * work.left)
     tight = isinstance(problem.g, Steps) and incumbent.gap <= TIGHT_GAP
-    if instance.risk.is_nominal and (tight or solver != "auto") and is_affordable(instance.of(rest), part):
+    if instance.is_plain and (tight or solver != "auto") and is_affordable(instance.of(rest), part):
         name = f"{name}, {check_solver(solver)}"
         yield from prove_by_program(incumbent, rest, solver, part)
     if not incumbent.proven:
@@ -119,7 +121,8 @@ def _shares(incumbent: Incumbent) -> Float:
             gains = np.stack([block.gains(block.together(chosen)) for block in instance.blocks])
             incumbent.work.spend(instance.operations)
             chosen = np.append(chosen, int(np.argmax(np.where(addable, shares @ gains, -1.0))))
-    return shares / shares.sum()
+    normalised: Float = shares / shares.sum()
+    return normalised
 
 
 def placement_of(problem: PlacementProblem, incumbent: Incumbent, solver: str) -> Placement:
@@ -142,7 +145,7 @@ def placement_of(problem: PlacementProblem, incumbent: Incumbent, solver: str) -
         solver=solver,
         seconds=incumbent.work.seconds,
         notes=tuple(notes),
-        objective=None if instance.risk.is_nominal else incumbent.value * instance.unit,
+        objective=incumbent.value * instance.unit,
     )
 
 

@@ -1,13 +1,13 @@
 """Price and benefit of robust placements, evaluated on held-out scenarios."""
 
-from collections.abc import Generator, Sequence
+from collections.abc import Generator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ...arrays import Float, Integer
 from ...estimates import IntervalEstimate, mean_of, quantile_gain, quantile_of
-from ...progress import Progress, within
+from ...progress import Progress
 from ...sensing.scenarios.scenario_visibility import ScenarioVisibility
 from ...sensing.scenarios.visibility_under_errors import draws_for, visibility_under_errors
 from ...sensing.visibility.surroundings import Surroundings
@@ -17,7 +17,6 @@ from ..placement.scenarios import Scenarios
 from ..placement.search_limits import DEFAULT_LIMITS, SolverLimits
 from ..placement.solver import solve
 from .pose_study import LOW_QUANTILE
-from .robust_placement import at_least, foresee, outcomes_of, solve_robust
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,35 +86,72 @@ class RobustStudy:
         return quantile_gain(contender.unseen, self.beside(contender).unseen, LOW_QUANTILE)
 
 
-def robust_study(
+@dataclass(frozen=True, eq=False)
+class RobustPlacements:
+    """The nominal optimum, and the best placement found for each risk measure."""
+
+    nominal: Placement
+    robust: Mapping[Risk, Placement]
+
+
+def robust_placements(
     around: Surroundings,
     problem: PlacementProblem,
     scenarios: Scenarios,
     risks: Sequence[Risk],
     limits: SolverLimits = DEFAULT_LIMITS,
-) -> Generator[Progress, None, RobustStudy]:
-    """Optimise for the planned poses and for each risk measure, and evaluate all placements on held-out scenarios.
+) -> Generator[Progress, None, RobustPlacements]:
+    """Optimise for the planned poses and for each risk measure.
 
     Parameters
     ----------
     problem : PlacementProblem
         Problem of all candidates of the site.
-    risks : sequence of Risk
-        Risk measure of each placement to compare.
     """
     every = np.flatnonzero(problem.allowed)  # no rays are cast from poses that may not be chosen
     views = yield from _views(around, problem, scenarios, every)
-    spread = views.spread_to(every, len(problem.visible))
-    nominal = yield from solve(problem, limits)
-    foreseen = yield from foresee(problem, spread, limits.solver, limits.clock())
-    ways = dict.fromkeys(risk.alone for risk in risks)  # in the order of the risks, each once
-    entries = [("the poses as planned", nominal, way) for way in ways]
-    for number, risk in enumerate(risks):
-        here = Progress(number, len(risks), f"placing for {risk.describe()}", counted=False)
-        yield here
-        steps = solve_robust(problem, spread, risk, limits, foreseen)
-        found: Placement = yield from within(here, steps)
-        placed = at_least(found, nominal, risk.of(outcomes_of(problem, spread, risk, nominal.chosen)))
+    views = views.spread_to(every, len(problem.amounts))
+    nominal = yield from solve(problem, limits, describe=problem.describe_road)
+    robust = {}
+    for risk in risks:
+        robust[risk] = yield from solve_over(problem, views, risk, nominal.chosen, limits)
+    return RobustPlacements(nominal, robust)
+
+
+def solve_over(
+    problem: PlacementProblem,
+    views: ScenarioVisibility,
+    risk: Risk,
+    known: Integer | None = None,
+    limits: SolverLimits = DEFAULT_LIMITS,
+) -> Generator[Progress, None, Placement]:
+    """Choose the placement that maximises a risk measure over scenarios; see `solve`.
+
+    Parameters
+    ----------
+    views : ScenarioVisibility
+        Visibility of all candidates in each scenario.
+    known : (k,) int64, optional
+        Placement to begin from besides: the result is no worse.
+    """
+    # scenarios that are all the same are one, so that results without errors have no other rounding
+    same = bool((views.packed == views.packed[:1]).all())
+    cases = [views.seen(number) for number in range(1 if same else len(views))]
+    return (yield from solve(problem, limits, cases=cases, risk=risk, known=known, describe=problem.describe_road))
+
+
+def outcomes_of(problem: PlacementProblem, scenarios: ScenarioVisibility, risk: Risk, chosen: Integer) -> Float:
+    """Return the outcome of chosen candidates in each scenario, (K,) float64, in units of the targets' weight."""
+    return risk.outcomes(scenarios.seen_by_each(chosen), problem.weights, problem.most_sensors)
+
+
+def robust_study(
+    around: Surroundings, problem: PlacementProblem, scenarios: Scenarios, placements: RobustPlacements
+) -> Generator[Progress, None, RobustStudy]:
+    """Evaluate the nominal optimum and robust placements on held-out scenarios."""
+    ways = dict.fromkeys(risk.alone for risk in placements.robust)  # in the order of the risks, each once
+    entries = [("the poses as planned", placements.nominal, way) for way in ways]
+    for risk, placed in placements.robust.items():
         entries.append((risk.describe() if scenarios.errs else risk.describe_outcome(), placed, risk.alone))
     contenders = yield from _evaluated(around, problem, scenarios, entries)
     return RobustStudy(scenarios, tuple(contenders[: len(ways)]), tuple(contenders[len(ways) :]))
@@ -126,7 +162,7 @@ def _views(
 ) -> Generator[Progress, None, ScenarioVisibility]:
     """Compute the visibility of poses in the scenarios to optimise over, or in the held-out ones."""
     if not scenarios.errs:
-        return ScenarioVisibility(np.packbits(problem.visible[poses], axis=1)[None], problem.visible.shape[1])
+        return ScenarioVisibility(np.packbits(problem.amounts[poses], axis=1)[None], problem.amounts.shape[1])
     number, seed = (scenarios.evaluated, scenarios.seed + 1) if held_out else (scenarios.optimised, scenarios.seed)
     drawn = draws_for(around, poses, scenarios.pose_errors, number, seed)
     return (yield from visibility_under_errors(around, poses, drawn))
@@ -141,7 +177,7 @@ def _evaluated(
     """Evaluate placements on held-out scenarios, all chosen poses at once."""
     used = np.unique(np.concatenate([placement.chosen for _, placement, _ in entries]))
     views = yield from _views(around, problem, scenarios, used, held_out=True)
-    planned = replace(views, packed=np.packbits(problem.visible[used], axis=1)[None])
+    planned = replace(views, packed=np.packbits(problem.amounts[used], axis=1)[None])
     total = float(problem.weights.sum())
     contenders = []
     for name, placement, evaluated_by in entries:

@@ -23,7 +23,7 @@ from ..placement.problem import Placement, PlacementProblem
 from ..placement.risk import Risk
 from ..placement.search_limits import DEFAULT_LIMITS, SolverLimits
 from ..placement.solver import solve
-from .robust_placement import at_least, outcomes_of, solve_robust
+from .robust_study import solve_over
 
 NOTABLE_LOSS = 0.01  # share of the targets' weight whose loss in traffic is worth a warning
 IN_TRAFFIC = "in traffic"  # first words of the message on a placement that is only evaluated
@@ -161,18 +161,13 @@ def traffic_scenarios(
     """
     every = np.flatnonzero(problem.allowed)
     views = yield from visibility_in_traffic(around, every, [NO_TRAFFIC, *instants.obstacles()])
-    return views.spread_to(every, len(problem.visible))
+    return views.spread_to(every, len(problem.amounts))
 
 
-def traffic_study(
-    around: Surroundings,
-    problem: PlacementProblem,
-    scenarios: ScenarioVisibility,
-    evaluation: Instants,
-    limits: SolverLimits = DEFAULT_LIMITS,
-    risk: Risk = MEAN,
-) -> Generator[Progress, None, TrafficStudy]:
-    """Optimise for the empty road and for traffic, and evaluate both placements at other instants.
+def traffic_placements(
+    problem: PlacementProblem, scenarios: ScenarioVisibility, limits: SolverLimits = DEFAULT_LIMITS, risk: Risk = MEAN
+) -> Generator[Progress, None, dict[str, Placement]]:
+    """Optimise for the empty road and for traffic; return the placements by these purposes.
 
     Parameters
     ----------
@@ -180,19 +175,35 @@ def traffic_study(
         Problem of all candidates of the site; their visibility is taken from the scenarios.
     scenarios : ScenarioVisibility
         Visibility on the empty road and at the instants to optimise on; see `traffic_scenarios`.
-    evaluation : Instants
-        Instants of runs other than those of the scenarios.
     risk : Risk
         Risk measure over the instants to maximise.
     """
-    problem = replace(problem, visible=scenarios.seen(0))
+    problem = replace(problem, amounts=scenarios.seen(0))
     views = replace(scenarios, packed=scenarios.packed[1:])
-    empty = yield from solve(problem, limits)
-    found = yield from solve_robust(problem, views, risk, limits)
-    reached = risk.of(outcomes_of(problem, views, risk, empty.chosen))
-    placements = {"the empty road": empty, "traffic": at_least(found, empty, reached)}
+    empty = yield from solve(problem, limits, describe=problem.describe_road)
+    return {"the empty road": empty, "traffic": (yield from solve_over(problem, views, risk, empty.chosen, limits))}
+
+
+def traffic_study(
+    around: Surroundings,
+    problem: PlacementProblem,
+    placements: Mapping[str, Placement],
+    chosen_at: int,
+    evaluation: Instants,
+) -> Generator[Progress, None, TrafficStudy]:
+    """Evaluate the placements for the empty road and for traffic at other instants.
+
+    Parameters
+    ----------
+    placements : mapping of str to Placement
+        See `traffic_placements`.
+    chosen_at : int
+        Number of instants that the second one was optimised on.
+    evaluation : Instants
+        Instants of runs other than those of the scenarios.
+    """
     evaluated = yield from evaluate_in_traffic(around, placements, problem.weights, evaluation)
-    return TrafficStudy(len(views), *evaluated)
+    return TrafficStudy(chosen_at, *evaluated)
 
 
 def evaluate_in_traffic(
