@@ -476,7 +476,8 @@ class _Order:
             end = begin + most
             full = (end < len(sums)) & (end > begin) & (len(others) == 1)
             self._weakest[full, kind] = np.diff(sums)[end[full] - 1]
-        self.most = np.maximum.accumulate(np.minimum(limit, bound.constant + largest)[::-1])[::-1]
+        self._largest = bound.constant + largest
+        self.most = np.maximum.accumulate(np.minimum(limit, self._largest)[::-1])[::-1]
 
     def children(self, goal: float) -> int:
         """Return the number of children whose bounds reach a goal."""
@@ -484,8 +485,9 @@ class _Order:
 
     def reach(self, rows: Integer) -> tuple[Float, Float]:
         """Return the bounds on some children (k,), and on those with each further candidate (k, n)."""
-        most, weakest = self.most[rows], self._weakest[rows][:, self.kind]
-        return most, most[:, None] - weakest + np.minimum(self._net, weakest)
+        weakest = self._weakest[rows][:, self.kind]
+        # a candidate replaces the weakest one of the sum itself: of the other bound it would take away too much
+        return self.most[rows], self._largest[rows][:, None] - weakest + np.minimum(self._net, weakest)
 
 
 def _sums(values: Float) -> Float:

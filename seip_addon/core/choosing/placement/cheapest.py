@@ -12,7 +12,7 @@ from ...arrays import Float, Integer
 from ...errors import SeipError
 from ...progress import Progress
 from .bounds import bound_at, falling_bounds, least_price, rest_of
-from .feasibility import starting_choice
+from .feasibility import serving_choice, starting_choice
 from .incumbent import Incumbent
 from .instance import Instance, make_instance
 from .objective import SAME_PRICE
@@ -79,7 +79,11 @@ class _Cheapest:
         proven = False
         while not proven and work.left > 0 and (cheaper := self._cheaper(chosen)) is not None:
             incumbent = Incumbent(cheaper, work.part((1.0 - FINISHING_SHARE) * work.left), self._describe, self._goal)
-            yield from search_and_prove(self._problem, incumbent, self._limits.solver, instance.original[chosen])
+            start = yield from serving_choice(cheaper, self._limits.solver)
+            if start is None:
+                proven = True
+                break
+            yield from search_and_prove(incumbent, start, self._limits.solver, instance.original[chosen])
             proven = incumbent.proven
             if incumbent.value < self._goal:
                 break
@@ -95,7 +99,7 @@ class _Cheapest:
         for power in (1.0, 0.0):
             incumbent.offer((yield from search.filled(start, power, "choosing greedily", goal)))
         if incumbent.value < goal:
-            yield from search_and_prove(self._problem, incumbent, solver)
+            yield from search_and_prove(incumbent, start, solver)
         if incumbent.value >= goal:
             return without_idle(incumbent, goal)
         wanted = f"a coverage of {goal / self._whole:.2%}"
@@ -114,8 +118,11 @@ class _Cheapest:
         instance = self._instance
         if self._equal_prices:
             return replace(instance, count=len(chosen) - 1) if len(chosen) > 1 else None
-        below = math.fsum(instance.price[chosen]) * (1 - 3 * TIE_TOLERANCE)
-        return replace(instance, budget=min(below, instance.budget)) if below >= instance.price.min() else None
+        price = math.fsum(instance.price[chosen])
+        below = price * (1 - 3 * TIE_TOLERANCE)
+        if price == 0 or below < instance.price.min():
+            return None
+        return replace(instance, budget=min(below, instance.budget))
 
     def _least_price(self, chosen: Integer) -> Generator[Progress, None, float]:
         """Return a price below which no placement reaches the goal."""
@@ -142,7 +149,8 @@ class _Cheapest:
         same = replace(instance, count=len(chosen)) if self._equal_prices else replace(instance, budget=price)
         incumbent = Incumbent(same, work.part(max(work.left, LEAST_FINISHING)), self._describe)
         incumbent.offer(chosen)
-        solver = yield from search_and_prove(problem, incumbent, self._limits.solver, instance.original[chosen])
+        start = yield from starting_choice(problem, same, self._limits.solver)
+        solver = yield from search_and_prove(incumbent, start, self._limits.solver, instance.original[chosen])
         kept = incumbent.chosen
         cost = math.fsum(instance.price[kept])
         optimal = proven or least >= cost * (1 - 3 * TIE_TOLERANCE)

@@ -23,6 +23,15 @@ def starting_choice(problem: PlacementProblem, instance: Instance, solver: str) 
     SeipError
         The groups cannot all be served; the message names the limit that prevents it.
     """
+    chosen = yield from serving_choice(instance, solver)
+    if chosen is None:
+        part = instance.of(np.flatnonzero(instance.mandatory.any(axis=0)))
+        raise SeipError((yield from _why_infeasible(problem, part, solver)))
+    return chosen
+
+
+def serving_choice(instance: Instance, solver: str) -> Generator[Progress, None, Integer | None]:
+    """Return candidates that serve all mandatory groups within the limits, (s,) int64; None if there are none."""
     if len(instance.mandatory) == 0:
         return np.zeros(0, np.int64)
     members = np.flatnonzero(instance.mandatory.any(axis=0))
@@ -33,9 +42,7 @@ def starting_choice(problem: PlacementProblem, instance: Instance, solver: str) 
     separately = part.gains(np.zeros(0, dtype=np.int64))
     scaled = program.number_among(np.arange(len(part)), 1e4 / max(float(separately.max()), 1e-12) * separately)
     chosen = yield from _decide(program, scaled, solver)
-    if chosen is None:
-        raise SeipError((yield from _why_infeasible(problem, part, solver)))
-    return members[chosen]
+    return None if chosen is None else members[chosen]
 
 
 def _why_infeasible(problem: PlacementProblem, part: Instance, solver: str) -> Generator[Progress, None, str]:

@@ -21,6 +21,7 @@ MAX_EXACT = 2.0**52  # sums of whole numbers up to here are exact in double prec
 MAX_SINGLE_TOTAL = 20_000.0  # total of whole weights up to which single precision tells sums apart
 MAX_DOUBLE = 20_000_000  # entries of A up to which several blocks together are kept in double precision
 WHOLE_SLACK = 0.25  # whole weights differ by one or not at all
+BINARY_PARTS = 16  # whole numbers, halves and so on up to this have a common unit
 DENOMINATORS = range(1, 13)  # a common unit of all weights is sought among these parts of the smallest one
 
 
@@ -164,18 +165,21 @@ class Instance:
         """Return a sum that is nowhere below the objective: the mean of the blocks by shares (K,) that add up to 1.
 
         Any shares of at most 1/m give a bound on the mean of the m worst of K outcomes. After a failure the value of a
-        target by the number of sensors is that of the mean over failures, which the worst one does not exceed.
+        target by the number of sensors that see it is that of the mean over failures, which the worst one does not
+        exceed; for other functions than `Steps` the bound is that without failures.
         """
         used = np.flatnonzero(shares)
         blocks = [self.blocks[k] for k in used]
-        weight: Float = np.concatenate([shares[k] * self.blocks[k].weight for k in used])
-        g = blocks[0].g
-        if self.risk.failure != "none":
-            weight, g = weight / self.count, Steps((self.count - 1.0, 1.0))
         if len(blocks) == 1 and self.risk.failure == "none":
             only: ConcaveSum = blocks[0]
             return only
-        amounts, weight = _merged(np.concatenate([block.amounts > 0 for block in blocks], axis=1), weight)
+        weight: Float = np.concatenate([shares[k] * self.blocks[k].weight for k in used])
+        amounts = np.concatenate([block.amounts for block in blocks], axis=1)
+        g = blocks[0].g
+        if isinstance(g, Steps):
+            amounts, weight = _merged(amounts > 0, weight)
+            if self.risk.failure != "none":
+                weight, g = weight / self.count, Steps((self.count - 1.0, 1.0))
         relaxed: ConcaveSum = g.sum_over(amounts, weight, single=amounts.size > MAX_DOUBLE)
         return relaxed
 
@@ -243,6 +247,9 @@ def common_unit(weights: Float) -> tuple[float, bool]:
         Positive.
     """
     total = math.fsum(weights)
+    parts = weights * BINARY_PARTS
+    if total * BINARY_PARTS <= MAX_EXACT and np.array_equal(np.rint(parts), parts):
+        return float(np.gcd.reduce(parts.astype(np.int64))) / BINARY_PARTS, True
     for share in DENOMINATORS:
         unit = float(weights.min()) / share
         if total / unit <= MAX_EXACT and np.array_equal(np.rint(weights / unit) * unit, weights):

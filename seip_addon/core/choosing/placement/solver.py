@@ -73,16 +73,24 @@ def solve(
     risk.require_sensors(problem.most_sensors)
     instance = make_instance(problem, cases, risk)
     incumbent = Incumbent(instance, limits.work(), describe)
-    solver = yield from search_and_prove(problem, incumbent, limits.solver, known)
+    start = yield from starting_choice(problem, instance, limits.solver)
+    solver = yield from search_and_prove(incumbent, start, limits.solver, known)
     return placement_of(problem, incumbent, solver)
 
 
 def search_and_prove(
-    problem: PlacementProblem, incumbent: Incumbent, solver: str, known: Integer | None = None
+    incumbent: Incumbent, start: Integer, solver: str, known: Integer | None = None
 ) -> Generator[Progress, None, str]:
-    """Improve a placement and its bound until they meet or the work is done; return the names of the methods used."""
+    """Improve a placement and its bound until they meet or the work is done; return the names of the methods used.
+
+    Parameters
+    ----------
+    start : (s,) int64
+        Candidates of the instance that serve all mandatory groups.
+    known : (k,) int64, optional
+        Candidates of the problem to begin from besides.
+    """
     instance, work = incumbent.instance, incumbent.work
-    start = yield from starting_choice(problem, instance, solver)
     search = Search(incumbent, start)
     yield from search.first()
     if known is not None:
@@ -93,7 +101,7 @@ def search_and_prove(
         return name
     yield from search.restarts(RESTART_SHARE * work.left)
     rest, part = branches.left(), work.part(PROGRAM_SHARE * work.left)
-    tight = isinstance(problem.g, Steps) and incumbent.gap <= TIGHT_GAP
+    tight = isinstance(instance.blocks[0].g, Steps) and incumbent.gap <= TIGHT_GAP
     if instance.is_plain and (tight or solver != "auto") and is_affordable(instance.of(rest), part):
         name = f"{name}, {check_solver(solver)}"
         yield from prove_by_program(incumbent, rest, solver, part)

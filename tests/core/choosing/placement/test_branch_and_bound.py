@@ -1,118 +1,121 @@
-"""Branch and bound, and the bound that it cuts by, against exhaustive search on the reduced problem."""
+"""Branch and bound against all feasible choices of small problems, whichever of its shortcuts are used."""
 
 import math
-from itertools import combinations
-
-from headless.studies.benchmark.street_visibility import street_problem
 
 import numpy as np
 import pytest
-from hypothesis import assume, given
+from hypothesis import given
 from hypothesis import strategies as st
 
-from seip_addon.core.choosing.placement import bounds, branch_and_bound
-from seip_addon.core.choosing.placement.bounds import lagrangian_bound
-from seip_addon.core.choosing.placement.branch_and_bound import BestPlacements
-from seip_addon.core.choosing.placement.reduced_problem import make_instance
-from seip_addon.core.choosing.placement.search_limits import Clock
+from seip_addon.core.choosing.placement import branch_and_bound
+from seip_addon.core.choosing.placement.branch_and_bound import BranchAndBound
+from seip_addon.core.choosing.placement.incumbent import Incumbent
+from seip_addon.core.choosing.placement.instance import make_instance
+from seip_addon.core.choosing.placement.risk import Risk
+from seip_addon.core.choosing.placement.search_limits import Work
 from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import finish
-from tests.oracles.placement_oracle import small_problems
+from tests.builders.placement_problems import all_choices, random_problem
 from tests.oracles.random_cases import cases
 
-
-def reduced(problem):
-    try:
-        return make_instance(problem)[0]
-    except SeipError:
-        return None
-
-
-def feasible(instance):
-    everyone = range(len(instance))
-    sizes = range(min(instance.count, len(instance)) + 1)
-    choices = (np.array(choice, dtype=np.int64) for size in sizes for choice in combinations(everyone, size))
-    return [choice for choice in choices if instance.feasible(choice)]
+SHORTCUTS = {
+    "usual": {},
+    "children of small problems": {"FEW": 0},
+    "no lists": {"FEW": 0, "LISTED": 0},
+    "few at once": {"FEW": 0, "LISTED": 0, "MAX_PAIRS": 1},
+    "no steps": {"ROOT_STEPS": 0, "NODE_STEPS": 0, "FEW": 0},
+    "one stage": {"LEAST_GAP": 1.0, "FEW": 0},
+}
 
 
-def forever():
-    return Clock(math.inf)
+@pytest.fixture(params=list(SHORTCUTS))
+def _shortcuts(request, monkeypatch):
+    for name, value in SHORTCUTS[request.param].items():
+        monkeypatch.setattr(branch_and_bound, name, value)
+    monkeypatch.setattr(branch_and_bound, "REPORTED", 1)
 
 
-def searched(instance, goal, most=10_000):
-    search = BestPlacements(instance, goal, most, instance.total)
-    assert finish(search.run(forever(), math.inf))
-    return search
+def poor_start(seed, *, returns=False, risk=None, shares=None):
+    """Return the worst placement of a random problem as the incumbent, with the search and the best value."""
+    number = seed
+    while True:
+        try:
+            problem = random_problem(number, returns=returns)
+            if risk is None:
+                instance = make_instance(problem)
+            else:
+                changed = np.random.default_rng((3, number)).random((len(shares), *problem.amounts.shape)) < 0.2
+                instance = make_instance(problem, list(problem.amounts ^ changed), risk)
+        except SeipError:
+            instance = None
+        choices = all_choices(instance) if instance is not None else []
+        if len(choices) > 1:
+            break
+        number += 1
+    incumbent = Incumbent(instance, Work(math.inf))
+    incumbent.offer(min(choices, key=instance.value))
+    relaxed = instance.relaxed(np.ones(1) if shares is None else np.array(shares))
+    return incumbent, BranchAndBound(incumbent, relaxed), max(map(instance.value, choices))
 
 
-@pytest.fixture(scope="module", params=[1, 10**9], ids=["relaxed", "not relaxed"], autouse=True)
-def _relax(request):
-    """Small problems have few children; relax their nodes none the less, and not at all."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(branch_and_bound, "MIN_CHILDREN", request.param)
-        patch.setattr(branch_and_bound, "MIN_SENSORS", 2)
-        yield
-
-
-@cases(200)
-@given(small_problems(), st.floats(0.0, 1.0))
-def test_all_best_placements_are_listed_or_proven_absent(problem, share):
-    instance = reduced(problem)
-    assume(instance is not None)
-    goal = share * instance.total
-    choices = [choice for choice in feasible(instance) if len(choice)]
-    best = max(map(instance.value, choices), default=-1.0)
-    search = searched(instance, goal)
-    assert not search.overflowed
-    if best < goal - instance.slack:
-        assert search.found == []
-        return
-    equal = [choice for choice in choices if instance.value(choice) == best]
-    listed = {tuple(choice) for choice in search.found}
-    assert listed <= {tuple(choice) for choice in equal}
-    fewest = min(map(len, equal))
-    assert listed >= {tuple(choice) for choice in equal if len(choice) == fewest}
-    few = searched(instance, goal, most=1)
-    assert len(few.found) == 1
-    np.testing.assert_array_equal(few.found[0], search.found[0])
-    assert few.overflowed == (len(search.found) > 1)
-
-
-@cases(100)
-@given(small_problems())
-def test_the_bound_of_a_search_that_was_stopped_holds_and_the_search_can_go_on(problem):
-    instance = reduced(problem)
-    assume(instance is not None)
-    best = max(map(instance.value, (choice for choice in feasible(instance) if len(choice))), default=-1.0)
-    assume(best > 0)
-    search = BestPlacements(instance, 0.0, 10_000, instance.total)
-    bounds, clock = [], Clock(math.inf, 1e9)
-    while not finish(search.run(clock, 0.0)):
-        found = max(map(instance.value, search.found), default=0.0)
-        assert max(found, search.bound) >= best
-        bounds.append(search.bound)
+@pytest.mark.usefixtures("_shortcuts")
+@cases(60)
+@given(st.integers(0, 10**6), st.booleans())
+def test_bound_holds_at_any_moment_and_ends_at_the_best_value(seed, returns):
+    incumbent, search, best = poor_start(seed, returns=returns)
+    slack = 2 * incumbent.instance.slack
+    bounds = []
+    for steps in (search.start(), search.run()):
+        for _ in steps:
+            assert incumbent.value <= best + slack
+            assert incumbent.bound >= best - slack
+            if bounds:
+                assert search.bound >= best - slack
+            block = incumbent.instance.blocks[0]
+            assert incumbent.gap >= block.g.gap(incumbent.value, best, float(block.weight.sum())) - 1e-8
+            if math.isfinite(incumbent.bound):
+                bounds.append(incumbent.bound)
     assert bounds == sorted(bounds, reverse=True)
-    assert instance.value(search.found[0]) == best
+    assert incumbent.proven
+    assert incumbent.value == pytest.approx(best, abs=slack)
 
 
-def test_a_full_queue_changes_nothing(monkeypatch):
-    instance = make_instance(street_problem(30, 200, seed=4, count=4))[0]
-    plain = searched(instance, 0.0)
-    monkeypatch.setattr(branch_and_bound, "MAX_WAITING_FOLLOWERS", 100)
-    deep = searched(instance, 0.0)
-    assert {tuple(choice) for choice in deep.found} == {tuple(choice) for choice in plain.found}
+@pytest.mark.usefixtures("_shortcuts")
+@cases(20)
+@given(st.integers(0, 10**6), st.booleans())
+def test_a_search_that_was_stopped_can_go_on(seed, returns):
+    incumbent, search, best = poor_start(seed, returns=returns)
+    finish(search.start())
+    for _ in range(10_000):
+        incumbent.work = Work(1e-9)  # enough for one node
+        if finish(search.run()):
+            break
+        assert not incumbent.proven
+        assert max(incumbent.bound, incumbent.value) >= best - incumbent.instance.slack
+        assert np.isin(incumbent.chosen, search.left()).all()
+    assert incumbent.proven
+    assert incumbent.value == pytest.approx(best, abs=2 * incumbent.instance.slack)
 
 
-@cases(150)
-@given(small_problems(), st.floats(0.0, 1.0))
-def test_every_placement_that_reaches_the_goal_is_left(problem, share):
-    instance = reduced(problem)
-    assume(instance is not None)
-    reaching = [choice for choice in feasible(instance) if instance.value(choice) >= share * instance.total]
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(bounds, "REDUCTION_INTERVAL", 2)
-        patch.setattr(bounds, "MAX_KEPT_SHARE", 1.0)
-        patch.setattr(bounds, "MAX_LISTED_CHOICES", 1)
-        keep, bound = finish(lagrangian_bound(instance, share * instance.total, forever()))
-    assert all(np.isin(choice, keep).all() for choice in reaching)
-    assert all(instance.value(choice) <= bound.value + instance.slack for choice in reaching)
+@pytest.mark.usefixtures("_shortcuts")
+@pytest.mark.parametrize(
+    ("risk", "shares"),
+    [
+        (Risk(), [1 / 3, 1 / 3, 1 / 3]),
+        (Risk(tail=0.5), [0.5, 0.2, 0.3]),
+        (Risk(tail=0.0), [0.0, 1.0, 0.0]),
+        (Risk(failure="worst"), [1.0]),
+        (Risk(tail=0.0, failure="mean"), [0.6, 0.4]),
+    ],
+    ids=str,
+)
+def test_bound_over_scenarios_and_failures_holds(risk, shares):
+    for seed in range(3):
+        incumbent, search, best = poor_start(seed, risk=risk, shares=shares)
+        if incumbent.instance.count < risk.least_sensors:
+            continue
+        finish(search.start())
+        assert incumbent.bound >= best - incumbent.instance.slack
+        finish(search.run())
+        assert incumbent.proven
+        assert incumbent.value == pytest.approx(best, abs=2 * incumbent.instance.slack)
