@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -68,23 +70,25 @@ def most_sensors(case: PlacementCase) -> int:
     return min(len(cheapest), max(1, affordable), math.inf if case.count is None else case.count)
 
 
-def risks(case: PlacementCase, views: Boolean, tail: float, failure: str) -> tuple[Integer, Float]:
+def risks(
+    case: PlacementCase, views: Sequence[NDArray[np.generic]], tail: float, failure: str
+) -> tuple[Integer, Float]:
     """Return the feasible subsets and the risk measure of each, (n,) float64.
 
     Parameters
     ----------
-    views : (k, c, t) bool
-        What each candidate sees in each scenario.
+    views : sequence of (c, t) bool or float32
+        Amounts in each scenario.
     tail : float
         Share of the worst scenarios whose outcomes are averaged, at least one.
     failure : {"none", "worst", "mean"}
-        The outcome of a scenario is the covered weight, or what is left of it after one sensor has failed: the most
-        important one, or each of the N allowed ones on average, where those that are not chosen cover nothing.
+        The outcome of a scenario is its value, or what is left of it after one sensor has failed: the most important
+        one, or each of the N allowed ones on average, where those that are not chosen have no value.
     """
     every, number = np.arange(1 << len(case.prices)), most_sensors(case)
     outcomes = np.empty((len(views), len(every)))
     for scenario, view in enumerate(views):
-        whole = (_union(view) @ case.weights).astype(np.float64)
+        whole = values(replace(case, amounts=view), every)
         left, lost = (whole if failure == "none" else np.where(every == 0, 0.0, math.inf)), np.zeros(len(every))
         for candidate in range(len(case.prices)) if failure != "none" else ():
             holds = (every >> candidate & 1).astype(bool)
@@ -95,11 +99,3 @@ def risks(case: PlacementCase, views: Boolean, tail: float, failure: str) -> tup
     subsets = feasible_subsets(case)
     counted = max(1, math.ceil(tail * len(views) - 1e-9))
     return subsets, np.sort(outcomes[:, subsets], axis=0)[:counted].mean(axis=0)
-
-
-def _union(view: Boolean) -> Boolean:
-    """Return what each subset of candidates sees together, (2^c, t) bool."""
-    seen = np.zeros((1, view.shape[1]), bool)
-    for row in view:
-        seen = np.concatenate([seen, seen | row])
-    return seen

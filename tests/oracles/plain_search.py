@@ -63,15 +63,18 @@ class _Swaps:
 
     def with_one(self, chosen: list[int], candidate: int) -> list[int]:
         """Return a choice with a candidate more, if that is allowed."""
-        fits = self._fits(chosen, np.ones((1, len(chosen)), bool))[0]
-        return [*chosen, candidate] if fits[candidate] else chosen
+        fits = self._fits(chosen, np.ones((1, len(chosen)), bool))[0, candidate]
+        return [*chosen, candidate] if fits and self._has_room(chosen) else chosen
+
+    def _has_room(self, chosen: list[int]) -> bool:
+        return self.case.count is None or len(chosen) < self.case.count
 
     def improved(self, chosen: list[int], *, per_price: bool) -> list[int]:
         case = self.case
         while True:
             base, value = case.amounts[chosen].sum(axis=0, dtype=np.float64), case.value(chosen)
             least = 1e-6 * abs(value)
-            if case.count is None or len(chosen) < case.count:
+            if self._has_room(chosen):
                 gain = self._values(base[None], chosen, np.ones((1, len(chosen)), bool))[0] - value
                 ratio = np.where(gain > least, gain / case.prices if per_price else gain, -math.inf)
                 if ratio.max() > 0:
@@ -81,7 +84,9 @@ class _Swaps:
             if not chosen or swapped.max() <= value + least:
                 return chosen
             out, pick = np.unravel_index(int(np.argmax(swapped)), swapped.shape)
-            chosen = [*chosen[:out], *chosen[out + 1 :], int(pick)]
+            before, chosen = chosen, [*chosen[:out], *chosen[out + 1 :], int(pick)]
+            if case.value(chosen) <= value:  # better in single precision only
+                return before
 
     def _values(self, bases: Float, chosen: list[int], kept: Boolean) -> Float:
         """Return the value of each candidate on top of each base, -inf where it does not fit, (b, c)."""

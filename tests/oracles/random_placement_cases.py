@@ -28,10 +28,10 @@ def draw_case(seed: int, most: int = 20, *, coverage_only: bool = False) -> tupl
     kind, logarithm = KINDS[seed % len(KINDS)], bool(seed // len(KINDS) % 2) and not coverage_only
     number = int(rng.choice([12, 13, 14, 15, 16, 17, 18, 20], p=[0.2, 0.2, 0.2, 0.15, 0.1, 0.05, 0.05, 0.05]))
     number = min(number, most)
-    targets = 1 if kind == "one target" else int(rng.integers(3, 40))
+    targets = 1 if kind == "one target" else int(rng.integers(5, 60))
     amounts = _amounts(rng, kind, (number, targets), logarithm=logarithm)
     prices = rng.choice(PRICES[rng.integers(len(PRICES))], number)
-    limited = rng.random(6) < [0.4, 0.3, 0.4, 0.5, 0.3, 0.75]
+    limited = rng.random(6) < [0.3, 0.3, 0.4, 0.5, 0.3, 0.75]
     positions = np.sort(rng.integers(0, int(rng.integers(5, number)), number)) if limited[2] else np.arange(number)
     xy = rng.uniform(0, 30, (number, 2)) if rng.random() < 0.5 else 5.0 * rng.integers(0, 6, (number, 2))
     forbidden = rng.random(number) < 0.2 if limited[0] else np.zeros(number, bool)
@@ -46,16 +46,16 @@ def draw_case(seed: int, most: int = 20, *, coverage_only: bool = False) -> tupl
         labels=rng.choice(["type1", "type2", "type3"], number),
         mandatory=_groups(rng, ~forbidden, int(rng.integers(1, 4)) if limited[1] else 0),
         forbidden=forbidden,
-        budget=float(prices.sum() * rng.choice([0.15, 0.3, 0.6])) if limited[3] else np.inf,
+        budget=float(prices.sum() * rng.choice([0.15, 0.25, 0.35, 0.5])) if limited[3] else np.inf,
         min_distance=float(rng.choice([5.0, 8.0, 12.0])) if limited[4] else 0.0,
     )
     places = len(np.unique(positions[~forbidden]))
-    case = replace(case, count=int(rng.integers(1, min(places, 7) + 1)) if limited[5] else None)
+    case = replace(case, count=min(places, int(rng.choice([1, 2, 3, 4, 5, 6, 7]))) if limited[5] else None)
     return kind, _infeasible(rng, case) if kind == "infeasible" else case
 
 
 def _amounts(rng, kind, shape, *, logarithm):
-    seen = rng.random(shape) < rng.choice([0.1, 0.25, 0.5, 0.8])
+    seen = rng.random(shape) < rng.choice([0.1, 0.2, 0.3, 0.4, 0.6])
     if kind == "blind candidates":
         seen[rng.random(shape[0]) < 0.6] = False
     seen[0, 0] = True  # of candidates that are allowed, one sees a target
