@@ -267,7 +267,7 @@ class StepSum(ConcaveSum):
         return 0.2 * self.amounts.size
 
     def of(self, keep: Integer, targets: Integer | None = None) -> Self:
-        """Return the sum for some of the candidates and targets; rows of targets are copied faster than their columns."""
+        """Return the sum for some of the candidates and targets; whole rows of targets are copied fastest."""
         if targets is None:
             by_row = self.amounts.flags.c_contiguous
             amounts = self.amounts[keep] if by_row else self.by_target.take(keep, axis=1).T
