@@ -405,7 +405,7 @@ class LogSum(ConcaveSum):
         ratio, linear = amount * np.exp(-at), amount * slope
         rising = 1.0 - slope * (1.0 + base)  # C'
         curved = np.log1p(ratio) < linear
-        derivative = rising - np.where(curved, rising * ratio / (1.0 + ratio), linear).sum(axis=0)
+        derivative: Float = rising - np.where(curved, rising * ratio / (1.0 + ratio), linear).sum(axis=0)
         at_limit = (parameters <= self.lowest(base)) & (derivative > 0)
         derivative[at_limit] = 0.0
         return derivative
