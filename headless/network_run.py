@@ -50,7 +50,7 @@ PROBLEM, SEARCHES = SURVEY_FILES[3], "searches.json"
 CURVE = (0.25, 0.5, 0.75, 1.5, 2.0)
 """Shares of the money, besides the whole, at which the curve of value against money is computed."""
 OWN_SITE = "each sensor counts for its own site: what it sees of a neighbouring site is left out"
-CURVE_TOLERANCE = 0.02
+CURVE_TOLERANCE, CURVE_EFFORT = 0.02, 1.0
 """Gap up to which the curve is refined, by short searches: long ones for points beyond the budget took longer than the
 search for the budget itself."""
 
@@ -324,7 +324,7 @@ class _Network:
         """Return the amounts of money at which the value of the network is computed."""
         tolerance = max(CURVE_TOLERANCE, self._request.tolerance)
         budgets = [share * self._request.budget for share in sorted((*CURVE, 1.0))]
-        return [Goal(budget, tolerance, effort=network_search.FIRST_EFFORT) for budget in budgets]
+        return [Goal(budget, tolerance, effort=CURVE_EFFORT) for budget in budgets]
 
     def _curve(self, allocations: Sequence[NetworkAllocation]) -> tuple[NetworkPoint, ...]:
         """Return the value of the network for amounts of money, with bounds."""

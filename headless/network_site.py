@@ -28,7 +28,6 @@ from seip_addon.core.workflows.survey_settings import SurveySettings
 from seip_addon.scene.blend_file import new_file, open_blend, save_blend
 from seip_addon.scene.build import build_scene
 from seip_addon.scene.read import read_scene
-from seip_addon.scene.result_folder import write_result_folder
 
 SCENE, VISIBILITY, PROBLEM = SURVEY_FILES[0], SURVEY_FILES[1], SURVEY_FILES[3]
 
@@ -77,6 +76,8 @@ def _survey(folder: Path, job: SurveyJob) -> Generator[Progress, None, None]:
 
 
 def _place(folder: Path, job: PlaceJob) -> Generator[Progress, None, None]:
+    from seip_addon.scene.result_folder import write_result_folder  # noqa: PLC0415 -- loads matplotlib, half a second
+
     open_blend(folder / SCENE)
     survey = yield from _surveyed(folder, job.settings)
     solution = yield from taken_solution(survey, job.objective, job.taken)

@@ -25,7 +25,7 @@ from seip_addon.core.progress import finish
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """Result of a method within its time limit.
+    """Result of a method within its limit.
 
     Parameters
     ----------
@@ -42,24 +42,23 @@ class Found:
     note: str = ""
 
 
-def ours(problem: PlacementProblem, seconds: float) -> Found:
-    """Solve by the project's own method."""
-    placement = finish(solve(problem, SolverLimits(time_limit=seconds)))
+def ours(problem: PlacementProblem, effort: float) -> Found:
+    """Solve by the project's own method, within units of counted work."""
+    placement = finish(solve(problem, SolverLimits(effort=effort)))
     return Found(placement.chosen, placement.bound)
 
 
 def plain_greedy(problem: PlacementProblem, _: float) -> Found:
-    """Add the pose with the largest gain until the count is reached, with the project's bound."""
-    placement = solve_greedy(problem)
-    return Found(placement.chosen, placement.bound)
+    """Add the pose with the largest gain until the count is reached."""
+    return Found(solve_greedy(problem).chosen)
 
 
 def lazy_greedy(problem: PlacementProblem, _: float) -> Found:
     """As greedy, but recompute a gain only if the old one could still be the largest (Minoux 1978)."""
     # Coverage is submodular: a pose's gain never grows as poses are added. An outdated gain is therefore an upper
     # bound, and a pose whose gain is up to date and on top of the heap is the greedy choice.
-    unseen = np.ones(problem.visible.shape[1], dtype=bool)
-    gains = problem.visible @ problem.weights
+    unseen: Boolean = np.ones(problem.amounts.shape[1], dtype=np.bool_)
+    gains = problem.amounts @ problem.weights
     heap = [(-gain, pose, 0) for pose, gain in enumerate(gains.tolist())]
     heapq.heapify(heap)
     chosen: list[int] = []
@@ -68,11 +67,11 @@ def lazy_greedy(problem: PlacementProblem, _: float) -> Found:
         if problem.positions[pose] in problem.positions[chosen]:
             continue
         if known_at < len(chosen):
-            gain = -float(problem.weights[problem.visible[pose] & unseen].sum())
+            gain = -float(problem.weights[problem.amounts[pose] & unseen].sum())
             heapq.heappush(heap, (gain, pose, len(chosen)))
         else:
             chosen.append(pose)
-            unseen &= ~problem.visible[pose]
+            unseen &= ~problem.amounts[pose]
     return Found(np.array(chosen))
 
 
@@ -80,12 +79,12 @@ def local_search(problem: PlacementProblem, seconds: float) -> Found:
     """Improve the greedy choice by the best swap of one pose for another, until none helps (Teitz and Bart 1968)."""
     chosen = lazy_greedy(problem, seconds).chosen
     while chosen is not None:
-        times = problem.visible[chosen].sum(axis=0)
+        times = problem.amounts[chosen].sum(axis=0)
         best, better = _covered(problem, chosen), None
         for gone in chosen:
             rest = chosen[chosen != gone]
-            left = (times - problem.visible[gone]) == 0
-            gain = problem.visible[:, left] @ problem.weights[left]
+            left = (times - problem.amounts[gone]) == 0
+            gain = problem.amounts[:, left] @ problem.weights[left]
             gain[np.isin(problem.positions, problem.positions[rest])] = -1.0
             new = int(np.argmax(gain))
             value = _covered(problem, np.append(rest, new))
@@ -131,7 +130,7 @@ def spopt_mclp(problem: PlacementProblem, seconds: float) -> Found:
     """Solve with spopt's MCLP and HiGHS; spopt has no constraint of one sensor per position."""
     from spopt.locate import MCLP  # noqa: PLC0415 - of the group 'benchmark', which need not be installed
 
-    hidden = 1.0 - problem.visible.T
+    hidden = 1.0 - problem.amounts.T
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DeprecationWarning)  # spopt makes variables as PuLP 4 no longer will
         mclp = MCLP.from_cost_matrix(hidden, problem.weights, service_radius=0.5, p_facilities=_count(problem))
@@ -155,6 +154,7 @@ BASELINES: dict[str, Callable[[PlacementProblem, float], Found]] = {
     "spopt MCLP": spopt_mclp,
     "ours": ours,
 }
+"""Methods by name. Their limit is in seconds; for ours, in units of counted work of about a second."""
 
 
 def can_run(rival: str) -> bool:
@@ -171,10 +171,10 @@ def can_run(rival: str) -> bool:
 def _plain_program(problem: PlacementProblem, category: str) -> tuple[Any, list[Any]]:
     """Return the textbook integer program and its variables x, one for each pose."""
     model = pulp.LpProblem("plain", pulp.LpMaximize)
-    x = [model.add_variable(f"x{i}", 0, 1, category) for i in range(len(problem.visible))]
+    x = [model.add_variable(f"x{i}", 0, 1, category) for i in range(len(problem.amounts))]
     y = [model.add_variable(f"y{j}", 0, 1, category) for j in range(len(problem.weights))]
     model.setObjective(pulp.lpDot(problem.weights.tolist(), y))
-    for y_j, column in zip(y, problem.visible.T, strict=True):
+    for y_j, column in zip(y, problem.amounts.T, strict=True):
         model += y_j <= pulp.lpSum(x[i] for i in np.flatnonzero(column))
     model += pulp.lpSum(x) <= _count(problem)
     for position in np.unique(problem.positions):
@@ -192,7 +192,7 @@ def _outcome(model: Any, x: list[Any]) -> Found:  # noqa: ANN401 - PuLP's progra
 
 
 def _covered(problem: PlacementProblem, chosen: Integer) -> float:
-    seen: Boolean = problem.visible[chosen].any(axis=0)
+    seen: Boolean = problem.amounts[chosen].any(axis=0)
     return float(problem.weights[seen].sum())
 
 

@@ -38,7 +38,7 @@ def save_charts(pictures: Path, findings: Findings) -> None:
     save_trade_off_chart(
         pictures / "placement.png",
         {f"gap: {name}": _ways_to_place(findings.runs, name) for name in instances},
-        f"Placement: processor time against the gap to the best bound, {setting['time_limit']:g} s for each",
+        f"Placement: processor time against the gap to the best bound, {setting['effort']:g} s for each",
         "the largest instance: twice that",
         linear_below=1e-4,
     )

@@ -1,7 +1,8 @@
 """Benchmark of visibility, placement and scans against alternatives: charts, a page and a JSON file.
 
 seip study benchmark scenes/junction.blend -o docs
-seip study benchmark scenes/junction.blend -o docs --sensor-models --site town.blend
+seip study benchmark scenes/junction.blend -o docs --only placement
+seip study benchmark scenes/junction.blend -o docs --only sensor-models --site town.blend
 """
 
 import argparse
@@ -10,7 +11,7 @@ from pathlib import Path
 
 from headless import runtime
 from headless.studies.benchmark.charts import save_charts
-from headless.studies.benchmark.measurements import BenchmarkScope, compare_sensor_models, measure
+from headless.studies.benchmark.measurements import BenchmarkScope, compare_sensor_models, measure, with_placement
 from headless.studies.benchmark.report import bars, load_json, save_json, save_page
 from headless.studies.benchmark.sensor_report import save_sensor_model_chart
 
@@ -30,9 +31,16 @@ def main(argv: list[str], scope: BenchmarkScope | None = None) -> None:
     parser.add_argument(
         "--places", type=int, default=12, help="number of sampled positions; a full scan of each takes seconds"
     )
-    parser.add_argument("--time-limit", type=float, default=60.0, help="time limit of each solve, seconds")
+    parser.add_argument(
+        "--effort",
+        type=float,
+        default=60.0,
+        help="limit of each solve: units of counted work, and seconds for the methods of others",
+    )
+    parser.add_argument(
+        "--only", choices=("placement", "sensor-models"), help="measure only this part; keep the rest of the page"
+    )
     models = parser.add_argument_group("models of the sensor")
-    models.add_argument("--sensor-models", action="store_true", help="measure only this chapter; keep the others")
     models.add_argument(
         "--site", action="append", type=Path, default=[], metavar="BLEND", help="another scene to measure; repeat it"
     )
@@ -45,31 +53,37 @@ def main(argv: list[str], scope: BenchmarkScope | None = None) -> None:
     runtime.check_folder(pictures)
     runtime.check_folder(options.work)
     figures = pictures / "benchmark.json"
-    kept = load_json(figures) if options.sensor_models or figures.exists() else None
-    if options.sensor_models and kept is not None:
+    kept = load_json(figures) if options.only or figures.exists() else None
+    if options.only == "sensor-models" and kept is not None:
         findings, checks = kept
     else:
         runtime.open_scene(options.scene)
-        findings, names = measure(read_scene(bpy.context.scene).geometry, options.places, options.time_limit, scope)
+        geometry = read_scene(bpy.context.scene).geometry
+        if options.only and kept is not None:
+            findings, names = with_placement(kept[0], geometry, options.effort, scope)
+        else:
+            findings, names = measure(geometry, options.places, options.effort, scope)
         checks = bars(findings.costs, findings.runs, names, findings.scans)
     for bar in checks:
         verdict = "" if bar.met else " – NOT MET"
         runtime.print_line(f"{bar.what}: required {bar.asked}, measured {bar.measured}{verdict}")
-    steps = compare_sensor_models(
-        [options.scene, *options.site],
-        options.time_limit,
-        scope,
-        seed=options.seed,
-        steps=options.steps,
-        work=options.work,
-    )
-    with runtime.progress_bar() as report:
-        models_compared = finish(steps, report).over(kept[0].sensor_models if kept else None)
-    findings = replace(findings, sensor_models=models_compared)
+    if options.only != "placement":
+        steps = compare_sensor_models(
+            [options.scene, *options.site],
+            options.effort,
+            scope,
+            seed=options.seed,
+            steps=options.steps,
+            work=options.work,
+        )
+        with runtime.progress_bar() as report:
+            models_compared = finish(steps, report).over(kept[0].sensor_models if kept else None)
+        findings = replace(findings, sensor_models=models_compared)
     with runtime.incomplete_if_interrupted(options.output):
-        if not options.sensor_models:
+        if options.only != "sensor-models":
             save_charts(pictures, findings)
-        save_sensor_model_chart(pictures, models_compared)
+        if findings.sensor_models is not None:
+            save_sensor_model_chart(pictures, findings.sensor_models)
         save_json(figures, findings, checks)
         save_page(options.output / "benchmark.md", findings, checks, "benchmark")
     runtime.print_line(f"results: {options.output / 'benchmark.md'}")

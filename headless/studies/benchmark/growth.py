@@ -17,8 +17,8 @@ import numpy as np
 import pulp
 
 from seip_addon.core.arrays import Float
-from seip_addon.core.choosing.placement.integer_program import CoverProgram
-from seip_addon.core.choosing.placement.reduced_problem import make_instance
+from seip_addon.core.choosing.placement.instance import make_instance
+from seip_addon.core.choosing.placement.integer_program import ConcaveProgram
 from seip_addon.core.sensing.lidar.model import LidarModel
 from seip_addon.core.sensing.visibility.chunks import compute_rows, sharing_rays
 from seip_addon.core.sensing.visibility.ray_casting import make_ray_caster
@@ -137,11 +137,11 @@ def visibility_cost(
     return for_site.cpu + for_positions.cpu * scaled.positions_per_sample, memory
 
 
-def placement_cost(positions: int, targets: int, blocks: int, seconds: float) -> tuple[float, float | None]:
+def placement_cost(positions: int, targets: int, blocks: int, effort: float) -> tuple[float, float | None]:
     """Optimise a placement in a street grid with three poses at each position; return processor seconds and MB."""
     problem = street_problem(positions, targets, blocks=blocks, count=STREET_SENSORS)
     expense = Expense()
-    _, memory = peak_memory(lambda: expense.time(lambda: ours(problem, seconds)))
+    _, memory = peak_memory(lambda: expense.time(lambda: ours(problem, effort)))
     return expense.cpu, memory
 
 
@@ -154,7 +154,7 @@ def visibility_growth(
 
 
 def placement_growth(
-    quantity: str, size: Sequence[int], steps: Sequence[tuple[int, int, int]], seconds: float
+    quantity: str, size: Sequence[int], steps: Sequence[tuple[int, int, int]], effort: float
 ) -> Growth:
     """Measure the cost of placement in street grids.
 
@@ -166,10 +166,10 @@ def placement_growth(
         Value of that quantity at each step.
     steps : sequence of (int, int, int)
         Positions, targets and blocks of the street grid at each step.
-    seconds : float
-        Time limit of each placement.
+    effort : float, units of counted work
+        Limit of each placement.
     """
-    costs = [in_fresh_process(partial(placement_cost, *step, seconds)) for step in steps]
+    costs = [in_fresh_process(partial(placement_cost, *step, effort)) for step in steps]
     return _growth(f"placement, N = {STREET_SENSORS}", quantity, size, costs)
 
 
@@ -179,15 +179,14 @@ def relaxation_cost(positions: int, targets: int, blocks: int) -> tuple[int, flo
     Returns
     -------
     (int, float, float or None)
-        Number of entries of V that remain after the exact reductions, processor seconds, and MB.
+        Number of entries of A that remain after the exact reductions, processor seconds, and MB.
     """
-    instance, _ = make_instance(street_problem(positions, targets, blocks=blocks, count=STREET_SENSORS))
-    program = CoverProgram(instance)
-    program.model.setObjective(program.covered)
+    program = ConcaveProgram(make_instance(street_problem(positions, targets, blocks=blocks, count=STREET_SENSORS)))
+    program.model.setObjective(program.objective)
     expense = Expense()
     solver = pulp.HiGHS(mip=False, msg=False, threads=1)
     _, memory = peak_memory(lambda: expense.time(lambda: program.model.solve(solver)))
-    return int(np.count_nonzero(instance.visible)), expense.cpu, memory
+    return program.entries, expense.cpu, memory
 
 
 def relaxation_growth(steps: Sequence[tuple[int, int, int]]) -> Growth:
@@ -198,7 +197,7 @@ def relaxation_growth(steps: Sequence[tuple[int, int, int]]) -> Growth:
     """
     results = [in_fresh_process(partial(relaxation_cost, *step)) for step in steps]
     entries = [entries for entries, *_ in results]
-    return _growth("first linear relaxation", "entries of V", entries, [(cpu, memory) for _, cpu, memory in results])
+    return _growth("first linear relaxation", "entries of A", entries, [(cpu, memory) for _, cpu, memory in results])
 
 
 def _growth(work: str, quantity: str, size: Sequence[float], costs: Sequence[tuple[float, float | None]]) -> Growth:

@@ -109,7 +109,7 @@ class BenchmarkScope:
 
 
 def measure(
-    geometry: SceneGeometry, samples: int, time_limit: float, scope: BenchmarkScope
+    geometry: SceneGeometry, samples: int, effort: float, scope: BenchmarkScope
 ) -> tuple[Findings, tuple[str, str, str]]:
     """Measure everything; return the findings and the names of the synthetic instances."""
     layout, settings = scope.layout, VisibilitySettings()
@@ -121,11 +121,11 @@ def measure(
     for way, cost in costs.items():
         LOG.info(f"{way:<24}{cost.seconds:>9.3f} s of CPU{cost.rays:>12,} rays")
     LOG.info("exact and simplified grids, and a placement by each")
-    degradation = degradations(site, models, settings, simpler, time_limit)
+    degradation = degradations(site, models, settings, simpler, effort)
     rates = {engine: cast_rate(make_ray_caster(site.triangles, engine), site.candidates.xyz[0]) for engine in ENGINES}
     limits = {str(engine): c.seconds * rates[engine] / c.seen for engine in ENGINES for c in [costs[f"lazy {engine}"]]}
-    runs, names = placements(site, models, settings, time_limit, scope)
-    growths = growth(geometry, settings, time_limit, scope)
+    runs, names = placements(site, models, settings, effort, scope)
+    growths = [*growth_of_visibility(geometry, settings, scope), *growth_of_placement(effort, scope)]
     LOG.info("scans of traffic")
     scans = scan_costs(site, static_scene(geometry), load_catalogue()[scope.scanned_by], scope.frames)
     setting = {
@@ -137,22 +137,38 @@ def measure(
         "sensor": layout.sensors[0],
         "count": SENSOR_COUNT,
         "scanned_by": scope.scanned_by,
-        "time_limit": time_limit,
+        "effort": effort,
         "cores": os.cpu_count(),
         "versions": {name: importlib.metadata.version(name) for name in ("bpy", "numpy", "embreex", "PuLP", "highspy")},
     }
     return Findings(setting, costs, degradation, limits, runs, growths, scans), names
 
 
+def with_placement(
+    findings: Findings, geometry: SceneGeometry, effort: float, scope: BenchmarkScope
+) -> tuple[Findings, tuple[str, str, str]]:
+    """Measure placement and its growth again; return the findings with these, and the names as `measure` does."""
+    models = find_models(load_catalogue(), scope.layout.sensors)
+    site = make_site(geometry, scope.layout, fields_of_view=fields_of_view(models))
+    runs, names = placements(site, models, VisibilitySettings(), effort, scope)
+    others = [one for one in findings.growths if one.what.startswith("visibility")]
+    return replace(
+        findings,
+        setting={**findings.setting, "effort": effort},
+        runs=runs,
+        growths=[*others, *growth_of_placement(effort, scope)],
+    ), names
+
+
 def compare_sensor_models(
-    scenes: Sequence[Path], time_limit: float, scope: BenchmarkScope, *, seed: int, steps: int, work: Path
+    scenes: Sequence[Path], effort: float, scope: BenchmarkScope, *, seed: int, steps: int, work: Path
 ) -> Generator[Progress, None, SensorModelFindings]:
     """Measure models of one LiDAR on scenes; if the first has traffic and PyTorch is installed, detection, too.
 
     Parameters
     ----------
-    time_limit : float, seconds
-        Time limit of each best placement.
+    effort : float, units of counted work
+        Limit of each best placement.
     seed : int
         Seed for placements, scans and the training.
     steps : int
@@ -172,7 +188,7 @@ def compare_sensor_models(
         runtime.open_scene(scene)
         layout = lay_out(read_scene(bpy.context.scene).geometry, settings)
         amount = {"placements": scope.placements, "checked": scope.every_beam, "seed": seed}
-        front = site_front(layout.site, models, counts=COUNTS, time_limit=time_limit, **amount)
+        front = site_front(layout.site, models, counts=COUNTS, effort=effort, **amount)
         sites.append(replace(front, bare=bool(bareness_warnings(layout.geometry))))
         runs = runs_beside(scene)
         if number == 0 and runs and importlib.util.find_spec("torch"):
@@ -188,7 +204,7 @@ def compare_sensor_models(
 
 
 def placements(
-    site: Site, models: dict[str, LidarModel], settings: VisibilitySettings, time_limit: float, scope: BenchmarkScope
+    site: Site, models: dict[str, LidarModel], settings: VisibilitySettings, effort: float, scope: BenchmarkScope
 ) -> tuple[list[SolverRun], tuple[str, str, str]]:
     """Compare placement methods on the scene's site and in synthetic streets."""
     own = site.candidates.sensor == site.candidates.sensor[0]
@@ -196,7 +212,7 @@ def placements(
     problem = placement_problem(site, visible, models, Objective(count=SENSOR_COUNT))
     problem = replace(
         problem,
-        visible=visible[own],
+        amounts=visible[own],
         prices=problem.prices[own],
         positions=problem.positions[own],
         xyz=problem.xyz[own],
@@ -208,27 +224,25 @@ def placements(
     ways = [way for way in BASELINES if can_run(way)]
     for way in set(BASELINES).difference(ways):
         LOG.info(f"{way} is left out: to include it, install the group 'benchmark' of pyproject.toml")
-    runs = _logged(compare(f"{site.name}, {site.candidates.sensor[0]}, N = {SENSOR_COUNT}", problem, ways, time_limit))
+    runs = _logged(compare(f"{site.name}, {site.candidates.sensor[0]}, N = {SENSOR_COUNT}", problem, ways, effort))
     names = []
     for count in scope.counts:
         names.append(_street_name(scope.street, count))
         positions, targets, blocks = scope.street
         street = street_problem(positions, targets, blocks=blocks, count=count)
-        runs += _logged(compare(names[-1], street, ways, time_limit))
+        runs += _logged(compare(names[-1], street, ways, effort))
     names.append(_street_name(scope.largest, scope.counts[-1]))
     positions, targets, blocks = scope.largest
     street = street_problem(positions, targets, blocks=blocks, count=scope.counts[-1])
     quick = ("greedy", "local search", "ours")
     # in a process of its own: a requirement limits its memory, and memory of earlier work would hide a part
-    runs += _logged(in_fresh_process(partial(compare, names[-1], street, quick, 2 * time_limit)))
+    runs += _logged(in_fresh_process(partial(compare, names[-1], street, quick, 2 * effort)))
     return runs, (names[0], names[1], names[2])
 
 
-def growth(
-    geometry: SceneGeometry, settings: VisibilitySettings, time_limit: float, scope: BenchmarkScope
-) -> list[Growth]:
+def growth_of_visibility(geometry: SceneGeometry, settings: VisibilitySettings, scope: BenchmarkScope) -> list[Growth]:
     """Measure growth with one size at a time, then with all: copies of the scene side by side."""
-    LOG.info("growth, each size in a process of its own")
+    LOG.info("growth of visibility, each size in a process of its own")
     models = find_models(load_catalogue(), scope.layout.sensors)
     site = make_site(geometry, scope.layout, fields_of_view=fields_of_view(models))
     rows = {copies: repeated(site, copies) for copies in scope.copies}
@@ -237,9 +251,6 @@ def growth(
     finer = [
         make_site(geometry, scope.layout, spacing, fields_of_view=fields_of_view(models)) for spacing in scope.spacings
     ]
-    positions, targets, blocks = scope.street
-    posts = [positions * times // scope.multiples[-1] for times in scope.multiples]
-    points = [targets * times // 2 for times in scope.multiples]
     found = [
         visibility_growth(
             "visibility",
@@ -265,10 +276,25 @@ def growth(
             models,
             settings,
         ),
-        placement_growth("poses", [3 * n for n in posts], [(n, targets, blocks) for n in posts], time_limit),
-        placement_growth("targets", points, [(positions, n, blocks) for n in points], time_limit),
+    ]
+    return _logged_growth(found)
+
+
+def growth_of_placement(effort: float, scope: BenchmarkScope) -> list[Growth]:
+    """Measure growth in street grids, with their positions and with their targets."""
+    LOG.info("growth of placement, each size in a process of its own")
+    positions, targets, blocks = scope.street
+    posts = [positions * times // scope.multiples[-1] for times in scope.multiples]
+    points = [targets * times // 2 for times in scope.multiples]
+    found = [
+        placement_growth("poses", [3 * n for n in posts], [(n, targets, blocks) for n in posts], effort),
+        placement_growth("targets", points, [(positions, n, blocks) for n in points], effort),
         relaxation_growth([(n, targets, blocks) for n in posts]),
     ]
+    return _logged_growth(found)
+
+
+def _logged_growth(found: list[Growth]) -> list[Growth]:
     for one in found:
         LOG.info(f"{one.what} against {one.size_of}: exponent {one.time_exponent:.2f}")
     return found

@@ -53,8 +53,8 @@ class SolverRun:
         return self.own_gap < 1e-6
 
 
-def compare(name: str, problem: PlacementProblem, ways: Sequence[str], seconds: float) -> list[SolverRun]:
-    """Solve an instance by several methods in turn, each with the same time limit.
+def compare(name: str, problem: PlacementProblem, ways: Sequence[str], limit: float) -> list[SolverRun]:
+    """Solve an instance by several methods in turn, each with the same limit.
 
     Parameters
     ----------
@@ -62,6 +62,8 @@ def compare(name: str, problem: PlacementProblem, ways: Sequence[str], seconds: 
         Name of the instance.
     ways : sequence of str
         Keys of `BASELINES`.
+    limit : float
+        Seconds, or units of counted work for ours.
 
     Returns
     -------
@@ -70,8 +72,8 @@ def compare(name: str, problem: PlacementProblem, ways: Sequence[str], seconds: 
     rows = []
     for way in ways:
         expense = Expense()
-        found, memory = peak_memory(partial(expense.time, partial(BASELINES[way], problem, seconds)))
-        seen = problem.visible[found.chosen].any(axis=0) if found.chosen is not None else problem.weights < 0
+        found, memory = peak_memory(partial(expense.time, partial(BASELINES[way], problem, limit)))
+        seen = problem.amounts[found.chosen].any(axis=0) if found.chosen is not None else problem.weights < 0
         objective = float(problem.weights[seen].sum())
         rows.append((way, expense, memory, objective, found))
     least = min((found.bound for *_, found in rows), default=math.inf)

@@ -182,11 +182,11 @@ def _about_visibility(findings: Findings, pictures: str) -> list[str]:
 
 def _about_placement(findings: Findings, pictures: str) -> list[str]:
     text = (
-        f"Every method had {findings.setting['time_limit']:g} s of wall-clock time, on the largest instance "
-        "twice that. The gap is to the lowest bound that any method proved for the instance; the own gap is to the "
-        "bound of the method itself. The plain program is the textbook one, with a binary variable for each pose and "
-        "each target. Memory is the growth of the process beyond the memory it held before; it does not include CBC, "
-        "which runs as a separate program."
+        f"Ours had {findings.setting['effort']:g} units of counted work, of about a second each, and the other methods "
+        "as many seconds of wall-clock time; on the largest instance twice that. The gap is to the lowest bound that "
+        "any method proved for the instance; the own gap is to the bound of the method itself. The plain program is "
+        "the textbook one, with a binary variable for each pose and each target. Memory is the growth of the process "
+        "beyond the memory it held before; it does not include CBC, which runs as a separate program."
     )
     head = ("instance", "method", "ours is … times as fast", "s", "wall-clock s", "MB", "covers", "gap", "own gap", "")
     picture = f"![processor time against gap of placement]({pictures}/placement.png)"

@@ -250,11 +250,11 @@ def random_placements(candidates: Candidates, count: int, number: int, seed: int
 
 
 def best_placement(
-    site: Site, models: Mapping[str, LidarModel], visible: Boolean, count: int, time_limit: float
+    site: Site, models: Mapping[str, LidarModel], visible: Boolean, count: int, effort: float
 ) -> Integer:
     """Return the poses (count,) that cover the most targets by a visibility grid."""
     problem = placement_problem(site, visible, models, Objective(count=count))
-    return finish(solve(problem, SolverLimits(time_limit=time_limit))).chosen
+    return finish(solve(problem, SolverLimits(effort=effort))).chosen
 
 
 def site_front(  # noqa: PLR0913  # what is measured, and how much of it
@@ -265,7 +265,7 @@ def site_front(  # noqa: PLR0913  # what is measured, and how much of it
     placements: int,
     checked: int,
     seed: int,
-    time_limit: float,
+    effort: float,
 ) -> SiteFront:
     """Measure coverage of random placements and of the best ones by each model, pose by pose in turn.
 
@@ -281,8 +281,8 @@ def site_front(  # noqa: PLR0913  # what is measured, and how much of it
         Number of poses at which the lazy engine is compared with casting every diverging beam.
     seed : int
         Seed of the placements.
-    time_limit : float, seconds
-        Time limit of each best placement.
+    effort : float, units of counted work
+        Limit of each best placement.
 
     Raises
     ------
@@ -311,7 +311,7 @@ def site_front(  # noqa: PLR0913  # what is measured, and how much of it
     drawn = {n: random_placements(candidates, n, placements, seed) for n in counts}
     best: dict[str, dict[str, tuple[float, float]]] = {}
     for model in models:
-        chosen = {n: best_placement(site, {key: model.lidar}, seen[model.name], n, time_limit) for n in counts}
+        chosen = {n: best_placement(site, {key: model.lidar}, seen[model.name], n, effort) for n in counts}
         best[model.name] = {str(n): (covered(model.name, one), covered(FINEST, one)) for n, one in chosen.items()}
     differing, compared = _against_every_beam(site, models[-1], settings, engines[models[-1].name], checked)
     return SiteFront(

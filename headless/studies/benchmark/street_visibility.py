@@ -38,7 +38,7 @@ def street_problem(
         visible.append((distance < reach) & (distance > blind) & ~hidden & ~between)
         xyz.append(np.column_stack([posts, np.full(positions, height)]))
     return PlacementProblem(
-        visible=np.concatenate(visible),
+        amounts=np.concatenate(visible),
         weights=np.ones(targets),
         prices=np.full(positions * heights, 6000.0),
         positions=np.tile(np.arange(positions), heights),

@@ -72,7 +72,7 @@ class Degradation:
     kept : int
         Number of its poses that the placement for the exact grid has as well.
     proven : bool
-        Whether the placement is proven optimal on its grid; otherwise the solver had too little time.
+        Whether the placement is proven optimal on its grid; otherwise the effort was too small.
     """
 
     wrong: float
@@ -162,7 +162,7 @@ def degradations(
     models: Mapping[str, LidarModel],
     settings: VisibilitySettings,
     simpler: Sequence[Approximation],
-    time_limit: float,
+    effort: float,
 ) -> dict[str, Degradation]:
     """Compute the degradation of grid and placement by each simplification, for four sensors of the first type.
 
@@ -174,12 +174,12 @@ def degradations(
         Degradation by name; the first is ``exact``.
     """
     exact = finish(compute_visibility(site, models, settings)).visible
-    best = placed(site, models, exact, time_limit)
+    best = placed(site, models, exact, effort)
     own = best.objective / len(site.targets)
     found = {"exact": Degradation(0.0, own, own, len(best.chosen), best.gap < PROVEN_GAP)}
     for one in simpler:
         visible = finish(compute_visibility(one.site, one.models, settings)).visible
-        placement = placed(one.site, models, visible, time_limit)
+        placement = placed(one.site, models, visible, effort)
         found[one.name] = Degradation(
             wrong=float((one.on_exact_targets(visible) != exact).sum() / exact.sum()),
             claimed=placement.objective / len(one.site.targets),
@@ -190,11 +190,11 @@ def degradations(
     return found
 
 
-def placed(site: Site, models: Mapping[str, LidarModel], visible: Boolean, time_limit: float) -> Placement:
+def placed(site: Site, models: Mapping[str, LidarModel], visible: Boolean, effort: float) -> Placement:
     """Return the best placement of four sensors of the site's first type, the vanilla problem."""
     sensor = site.candidates.sensor
     problem = placement_problem(site, visible, models, Objective(count=SENSOR_COUNT))
-    return finish(solve(replace(problem, forbidden=sensor != sensor[0]), SolverLimits(time_limit=time_limit)))
+    return finish(solve(replace(problem, forbidden=sensor != sensor[0]), SolverLimits(effort=effort)))
 
 
 def cast_rate(caster: RayCaster, origin: Float, rays: int = 20_000) -> float:

@@ -117,7 +117,7 @@ class _Drawing:
 
     def _worst(self) -> Integer:
         """Return poses that each see something, and each add least to those before them."""
-        visible, positions = self._problem.visible, self._problem.positions
+        visible, positions = self._problem.amounts, self._problem.positions
         free = self._poses[visible[self._poses].any(axis=1)]
         seen = np.zeros(visible.shape[1], dtype=bool)
         chosen: list[int] = []
@@ -128,4 +128,4 @@ class _Drawing:
         return np.array(chosen, dtype=np.int64)
 
     def _coverage(self, poses: Integer) -> float:
-        return float(self._problem.visible[poses].any(axis=0).mean())
+        return float(self._problem.amounts[poses].any(axis=0).mean())

@@ -8,9 +8,9 @@ from headless.detection.recordings import SampledRun
 import numpy as np
 
 from seip_addon.core.arrays import Integer
+from seip_addon.core.choosing.placement.concave import LOG_RETURNS
 from seip_addon.core.choosing.placement.objective import Objective, placement_problem
 from seip_addon.core.choosing.placement.problem import PlacementProblem
-from seip_addon.core.choosing.placement.returns_solver import solve_returns
 from seip_addon.core.choosing.placement.solver import solve
 from seip_addon.core.progress import Progress, within
 from seip_addon.core.sensing.returns.occlusion import returns_in_traffic
@@ -85,13 +85,12 @@ def best_of(criterion: PoseCriterion, survey: Survey, problem: PlacementProblem)
     yield progress
     limits = survey.settings.limits
     if isinstance(criterion, SeenShare) and criterion.key not in OF_LITERATURE:
-        of_criterion = replace(problem, visible=criterion.seen, weights=criterion.weight)
-        placement = yield from within(progress, solve(of_criterion, limits))
+        problem = replace(problem, amounts=criterion.seen, weights=criterion.weight)
     elif isinstance(criterion, LogReturns):
-        of_returns = replace(problem, visible=criterion.returns > 0, weights=criterion.weight)
-        placement = yield from within(progress, solve_returns(of_returns, criterion.returns, limits))
+        problem = replace(problem, amounts=criterion.returns, weights=criterion.weight, g=LOG_RETURNS)
     else:
         return (yield from best_by_greed(criterion, problem))
+    placement = yield from within(progress, solve(problem, limits))
     return np.sort(placement.chosen)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import Callable, Generator, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -16,8 +16,8 @@ from seip_addon.core.choosing.placement.risk import Risk
 from seip_addon.core.choosing.placement.scenarios import Scenarios
 from seip_addon.core.choosing.placement.solver import solve
 from seip_addon.core.choosing.robustness.pose_study import PoseStudySettings, pose_study
-from seip_addon.core.choosing.robustness.robust_study import robust_study
-from seip_addon.core.choosing.robustness.traffic_study import traffic_scenarios, traffic_study
+from seip_addon.core.choosing.robustness.robust_study import RobustStudy, robust_placements, robust_study
+from seip_addon.core.choosing.robustness.traffic_study import traffic_placements, traffic_scenarios, traffic_study
 from seip_addon.core.progress import Progress
 from seip_addon.core.sensing.scenarios.traffic_instants import spread_instants
 from seip_addon.core.sensing.traffic.trajectories import Trajectories
@@ -160,8 +160,7 @@ def arithmetic(scene: StudiedScene) -> Generator[Progress, None, Chapter]:
 def poses(scene: StudiedScene) -> Generator[Progress, None, Chapter]:
     """Study a placement under pose errors."""
     survey, around = scene.survey, surroundings(scene.survey)
-    problem = scene.problem(scene.sensor)
-    study = yield from robust_study(around, problem, scene.scope.robust, TAIL_RISKS, survey.settings.limits)
+    study = yield from _robust(scene, TAIL_RISKS)
     chosen = study.nominal[0].placement.chosen
     deployment = deploy(survey.site, survey.models, survey.grid.rows(chosen), chosen)
     under_errors = yield from pose_study(around, deployment, scene.scope.poses)
@@ -183,29 +182,29 @@ def poses(scene: StudiedScene) -> Generator[Progress, None, Chapter]:
 
 def failures(scene: StudiedScene) -> Generator[Progress, None, Chapter]:
     """Study placements under sensor failures and multi-cover."""
-    around, problem = surroundings(scene.survey), scene.problem(scene.sensor)
-    study = yield from robust_study(around, problem, scene.scope.robust, RISKS, scene.survey.settings.limits)
+    study = yield from _robust(scene, RISKS)
     pose_error_charts.save_spread_chart(scene.charts / "failures.png", study, f"{scene.placed}: failures")
     caption = "Distribution of remaining coverage over unseen draws: placements for failures and the nominal optimum"
     return Chapter(f"Failures: {scene.placed}", robust_rows(study), (Chart("failures.png", caption),))
 
 
+def _robust(scene: StudiedScene, risks: Sequence[Risk]) -> Generator[Progress, None, RobustStudy]:
+    """Optimise for risk measures, and evaluate the placements on held-out scenarios."""
+    around, problem, scenarios = surroundings(scene.survey), scene.problem(scene.sensor), scene.scope.robust
+    placements = yield from robust_placements(around, problem, scenarios, risks, scene.survey.settings.limits)
+    return (yield from robust_study(around, problem, scenarios, placements))
+
+
 def traffic(scene: StudiedScene) -> Generator[Progress, None, Chapter]:
     """Study placements in traffic."""
     survey = scene.survey
-    around, problem, settings = surroundings(survey), scene.problem(scene.sensor), survey.settings
+    around, problem = surroundings(survey), scene.problem(scene.sensor)
     runs_to_choose, runs_to_evaluate = split_runs(scene.runs)
     to_choose, to_evaluate = scene.scope.instants
     scenarios = yield from traffic_scenarios(around, problem, spread_instants(runs_to_choose, to_choose, seed=0))
     evaluation = spread_instants(runs_to_evaluate, to_evaluate, seed=1)
-    steps = traffic_study(
-        around,
-        problem,
-        scenarios,
-        evaluation,
-        settings.limits,
-    )
-    study = yield from steps
+    placements = yield from traffic_placements(problem, scenarios, survey.settings.limits)
+    study = yield from traffic_study(around, problem, placements, to_choose, evaluation)
     chosen = study.traffic.placement.chosen
     deployment = deploy(survey.site, survey.models, survey.grid.rows(chosen), chosen)
     title = f"{scene.placed} in traffic"

@@ -79,10 +79,19 @@ def _is_ours(name: str) -> bool:
     return any(name == part or name.startswith(f"{part}.") for part in _OURS)
 
 
+def _statements(node: ast.AST) -> Iterator[ast.AST]:
+    """Yield the statements of a module, those within others included, without their expressions."""
+    for name in ("body", "handlers", "orelse", "finalbody", "cases"):
+        inner = getattr(node, name, ())
+        for statement in inner if isinstance(inner, list) else ():  # the body of a lambda is an expression
+            yield statement
+            yield from _statements(statement)
+
+
 def _imported(spec: ModuleSpec, source: str) -> Iterator[str]:
     """Yield the full names of the project's modules that a module imports anywhere in its source."""
     package = spec.name if spec.submodule_search_locations is not None else spec.name.rpartition(".")[0]
-    for node in ast.walk(ast.parse(source)):
+    for node in _statements(ast.parse(source)):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):

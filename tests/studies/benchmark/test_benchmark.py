@@ -39,7 +39,7 @@ def folder(small_scene, tmp_path_factory):
     pytest.importorskip("embreex", reason="embreex is not installed")
     folder = tmp_path_factory.mktemp("benchmark")
     work = ["--steps", "2", "--work", str(folder / "work")]
-    benchmark.main([str(small_scene), "-o", str(folder), "--places", "1", "--time-limit", "5", *work], SMALL)
+    benchmark.main([str(small_scene), "-o", str(folder), "--places", "1", "--effort", "5", *work], SMALL)
     return folder
 
 
@@ -65,6 +65,22 @@ def test_the_figures_hold_every_way(folder):
     assert all(len(growth["seconds"]) == len(growth["size"]) for growth in record["growth"])
 
     assert "first linear relaxation" in {growth["what"] for growth in record["growth"]}
+
+
+@pytest.mark.slow
+def test_placement_alone_is_measured_again(folder, small_scene):
+    figures = folder / "benchmark" / "benchmark.json"
+    before = json.loads(figures.read_text(encoding="utf-8"))
+    options = ["-o", str(folder), "--only", "placement", "--effort", "4", "--work", str(folder / "work")]
+    benchmark.main([str(small_scene), *options], SMALL)
+    after = json.loads(figures.read_text(encoding="utf-8"))
+    changed = {name for name in after if after[name] != before[name]}
+    assert {"setting", "placement", "growth"} <= changed <= {"setting", "placement", "growth", "bars"}
+    assert after["setting"] == {**before["setting"], "effort": 4.0}
+    assert [(one["what"], one["size"]) for one in after["growth"]] == [
+        (one["what"], one["size"]) for one in before["growth"]
+    ]
+    assert after["growth"][0] == before["growth"][0]
 
 
 def test_every_way_to_place_keeps_to_the_rules_and_none_beats_a_bound():

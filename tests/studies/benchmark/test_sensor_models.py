@@ -81,7 +81,7 @@ def own_site():
 @pytest.fixture(scope="module")
 def front():
     pytest.importorskip("embreex", reason="embreex is not installed")
-    amount = {"counts": (1, 2), "placements": 5, "checked": 3, "seed": 0, "time_limit": 10.0}
+    amount = {"counts": (1, 2), "placements": 5, "checked": 3, "seed": 0, "effort": 10.0}
     return site_front(own_site(), sensor_models(LIDAR), **amount)
 
 

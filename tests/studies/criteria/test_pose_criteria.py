@@ -28,7 +28,7 @@ def poses(*chosen):
 def problem(positions, count, mandatory=None):
     number = len(positions)
     return PlacementProblem(
-        visible=np.ones((number, 1), dtype=bool),
+        amounts=np.ones((number, 1), dtype=bool),
         weights=np.ones(1),
         prices=np.ones(number),
         positions=np.array(positions),

@@ -15,7 +15,7 @@ from ..placement.problem import TIE_TOLERANCE
 from .allocation import allocate, allocation_of, relaxed_allocation
 from .frontier import Frontier, SolvedBudget
 
-FIRST_EFFORT, LAST_EFFORT, GROWTH = 1.0, 64.0, 4.0
+FIRST_EFFORT, LAST_EFFORT, GROWTH = 0.25, 64.0, 4.0
 """Counted work of the first and the last search of a budget at a site, and the factor from one to the next."""
 FIRST_SENSORS = (1, 2, 4)
 """Numbers of sensors whose money is solved at every site before any allocation."""
