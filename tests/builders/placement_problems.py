@@ -14,14 +14,15 @@ HALVES = [[1, 1, 0, 0], [0, 0, 1, 1], [0, 1, 1, 0], [0, 0, 0, 1]]
 
 def row_problem(visible=HALVES, **changes) -> PlacementProblem:
     """Return a problem of poses 10 m apart on a line, one at each position, all of one type."""
-    number, targets = np.shape(visible)
+    amounts = np.asarray(visible)
+    number, targets = amounts.shape
     parts = {
         "weights": np.ones(targets),
         "prices": np.full(number, 6000.0),
         "positions": np.arange(number),
         "xyz": np.column_stack([10.0 * np.arange(number), np.zeros(number), np.full(number, 5.0)]),
         "labels": np.full(number, "type1"),
-        "amounts": np.array(visible, bool),
+        "amounts": amounts if amounts.dtype.kind == "f" else amounts.astype(bool),
     }
     return PlacementProblem(**(parts | changes))
 

@@ -116,6 +116,7 @@ class BranchAndBound:
         self._open: list[_Node] = []
         self._waiting: list[_Node] = []
         self._goal = -math.inf
+        self._by_gains_only = False
 
     @property
     def bound(self) -> float:
@@ -168,17 +169,40 @@ class BranchAndBound:
 
     def run(self) -> Generator[Progress, None, bool]:
         """Search until nothing can be better, or the work is done; return whether the best placement is proven."""
-        incumbent = self.incumbent
         while not self._next_stage():
-            while self._open and -self._open[0].rank >= max(self._goal, incumbent.least_better):
-                if self._met % REPORTED == 0:
-                    self._note(self.bound)
-                    yield incumbent.progress("proving that no placement is better")
-                if incumbent.work.left <= 0:
-                    self._note(self.bound)
-                    return False
-                self._met += 1
-                self._take(heappop(self._open))
+            if not (yield from self._finish_stage(0.0)):
+                return False
+        return True
+
+    def run_greedily(self, share: float) -> Generator[Progress, None, bool]:
+        """Search with a share of the work that is left, without stages and by gains only.
+
+        Where gains come by products of matrices, few sensors are proven soonest in this way: in the order of gains each
+        sensor adds no more than the one before it (cf. Nemhauser and Wolsey 1981).
+        """
+        if not self._block.has_product or len(self._open) != 1 or self.incumbent.proven:
+            return self.incumbent.proven
+        first, self._by_gains_only = list(self._open), True
+        spare = (1.0 - share) * self.incumbent.work.left
+        finished = yield from self._finish_stage(spare)
+        self._by_gains_only = False
+        self._open = [] if finished else first
+        if finished:
+            self.incumbent.close()
+        return finished
+
+    def _finish_stage(self, spare: float) -> Generator[Progress, None, bool]:
+        """Take nodes until none reaches the goal of the stage; return False if no more than ``spare`` work is left."""
+        incumbent = self.incumbent
+        while self._open and -self._open[0].rank >= max(self._goal, incumbent.least_better):
+            if self._met % REPORTED == 0:
+                self._note(self.bound)
+                yield incumbent.progress("proving that no placement is better")
+            if incumbent.work.left <= spare:
+                self._note(self.bound)
+                return False
+            self._met += 1
+            self._take(heappop(self._open))
         return True
 
     def _next_stage(self) -> bool:
@@ -256,7 +280,7 @@ class BranchAndBound:
         if problem.rest.count == 1:
             self._complete(node.chosen, left, by_gains.constant + by_gains.selection.net)
             return
-        bound = self._lowered(node, problem, by_gains, targets)
+        bound = by_gains if self._by_gains_only else self._lowered(node, problem, by_gains, targets)
         incumbent.offer(np.append(node.chosen, left[bound.selection.picked]))
         limit = min(bound.value, -node.rank)
         parameters = node.parameters.copy()
@@ -274,7 +298,8 @@ class BranchAndBound:
             first = np.isin(problem.left, problem.first)
             if len(problem.rest.groups):
                 first = min(problem.rest.groups, key=np.count_nonzero)
-            orders = [_Order(problem.rest, one, within, first, limit) for one in (bound, by_gains)]
+            bounds = (by_gains,) if self._by_gains_only else (bound, by_gains)
+            orders = [_Order(problem.rest, one, within, first, limit) for one in bounds]
             self._branch(problem, min(orders, key=lambda order: order.children(goal)), goal)
 
     def _is_small(self, problem: _Problem) -> bool:
@@ -372,8 +397,9 @@ class BranchAndBound:
         incumbent.offer(child.chosen)
         if not len(left):
             return
-        part = block.of(left)
         base = problem.base + block.amounts[own]
+        targets = block.open_targets(base)
+        part, base = block.of(left, targets), base[targets]
         pairs = values[:, None] + np.maximum(part.gains_after(base, np.arange(len(left))), 0.0)
         incumbent.work.spend(PRODUCT_SHARE * len(left) * part.operations)
         members = problem.left[left]

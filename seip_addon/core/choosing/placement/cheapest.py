@@ -15,6 +15,7 @@ from .bounds import bound_at, falling_bounds, least_price, rest_of
 from .feasibility import serving_choice, starting_choice
 from .incumbent import Incumbent
 from .instance import Instance, make_instance
+from .integer_program import check_solver
 from .objective import SAME_PRICE
 from .problem import TIE_TOLERANCE, Placement, PlacementProblem, assess
 from .search import Search, without_idle
@@ -50,10 +51,11 @@ def cheapest_for_share(
     Raises
     ------
     SeipError
-        No placement within the limits reaches the share, or none was found.
+        No placement within the limits reaches the share, none was found, or the solver is not available.
     """
     if not 0 < share <= 1:
         raise SeipError(f"the coverage to reach is {share:g}; give a share above 0 and up to 1")
+    check_solver(limits.solver)
     return (yield from _Cheapest(problem, share, limits, describe).solve())
 
 

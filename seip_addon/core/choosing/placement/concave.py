@@ -39,6 +39,7 @@ from ...arrays import Float, Integer
 ROWS_AT_ONCE = 16  # rows that stay in a processor's cache
 SINGLE_ROUNDING = 1e-5  # share of a sum of single-precision products by which it may be wrong
 DOUBLE_ROUNDING = 1e-11  # the same for double precision
+FEW_ENTRIES = 200_000  # entries of A up to which they are copied one by one
 MAX_UPDATES, UPDATED_SHARE = 100, 0.3  # updates of earlier results in a row, and share of targets that may change
 
 
@@ -156,7 +157,7 @@ class ConcaveSum:
         """Return the sum for some of the candidates, and some of the targets."""
         if targets is None or len(targets) == len(self.weight):
             return type(self)(self.amounts[keep], self.weight, self.g)
-        return type(self)(self.amounts[np.ix_(keep, targets)], self.weight[targets], self.g)
+        return type(self)(self.amounts[keep].take(targets, axis=1), self.weight[targets], self.g)
 
     def together(self, chosen: Integer) -> Float:
         """Return the amounts of chosen candidates together at each target, (t,) float64."""
@@ -265,6 +266,26 @@ class StepSum(ConcaveSum):
         """A product with the part of the matrix that has changed."""
         return 0.2 * self.amounts.size
 
+    def of(self, keep: Integer, targets: Integer | None = None) -> Self:
+        """Return the sum for some of the candidates and targets; rows of targets are copied faster than their columns."""
+        if targets is None:
+            by_row = self.amounts.flags.c_contiguous
+            amounts = self.amounts[keep] if by_row else self.by_target.take(keep, axis=1).T
+            return type(self)(amounts, self.weight, self.g)
+        if len(keep) * len(targets) < FEW_ENTRIES:
+            return type(self)(self.amounts[np.ix_(keep, targets)], self.weight[targets], self.g)
+        part = self.by_target[targets]
+        if len(keep) < len(self):
+            part = part.take(keep, axis=1)
+        return type(self)(part.T, self.weight[targets], self.g)
+
+    @property
+    def by_target(self) -> NDArray[np.floating[Any]]:
+        """Amounts by target, (t, c)."""
+        if self._last.by_target is None:
+            self._last.by_target = np.ascontiguousarray(self.amounts.T)
+        return self._last.by_target
+
     def together(self, chosen: Integer) -> Float:
         """Return how many of the chosen candidates see each target: small whole numbers, exact in any precision."""
         together: Float = (np.ones(len(chosen), self.amounts.dtype) @ self.amounts[chosen]).astype(np.float64)
@@ -288,10 +309,9 @@ class StepSum(ConcaveSum):
         each, last = self.weight * self._rise(base), self._last
         changed = np.flatnonzero(each != last.each) if last.uses else np.zeros(0)
         if 0 < last.uses < MAX_UPDATES and len(changed) < UPDATED_SHARE * len(each):
-            if last.by_target is None:
-                last.by_target = np.ascontiguousarray(self.amounts.T)
-            difference = (each - last.each)[changed].astype(self.amounts.dtype)
-            last.gains = last.gains + (difference @ last.by_target[changed]).astype(np.float64)
+            if len(changed):
+                difference = (each - last.each)[changed].astype(self.amounts.dtype)
+                last.gains = last.gains + (difference @ self.by_target[changed]).astype(np.float64)
         else:
             last.gains, last.uses = self._product(each), 0
         last.each, last.uses = each, last.uses + 1

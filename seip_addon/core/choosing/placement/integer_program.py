@@ -178,7 +178,9 @@ class PlacementProgram:
         status = self.model.sol_status
         solved = status in (pulp.LpSolutionOptimal, pulp.LpSolutionIntegerFeasible)
         chosen = np.flatnonzero([round(x.value() or 0.0) for x in self.x]) if solved else None
-        finished = status in (pulp.LpSolutionOptimal, pulp.LpSolutionInfeasible)
+        # PuLP has no status of the solution where CBC finds the integers infeasible, and calls one infeasible that
+        # Gurobi has not found yet: only the status of the problem is the same for all solvers
+        finished = status == pulp.LpSolutionOptimal or self.model.status == pulp.LpStatusInfeasible
         return Outcome(chosen, _bound(self.model, solver), finished, _nodes(self.model, solver))
 
 

@@ -24,6 +24,9 @@ from .risk import NOMINAL, Risk
 from .search import Search, without_idle
 from .search_limits import DEFAULT_LIMITS, SolverLimits, Work
 
+QUICK_SHARE, GREEDY_SHARE = 0.08, 0.75
+"""Shares of what is left for branch and bound by gains only, before and after the restarts."""
+GREEDY_SENSORS = 5  # sensors up to which that often ends with a proof
 RESTART_SHARE = 0.5  # share of what is left for restarts
 ROUNDS = 8  # rounds of fictitious play for the shares of scenarios
 PROGRAM_SHARE = 0.5  # share of what is left then for an integer program
@@ -70,6 +73,7 @@ def solve(
         The constraints cannot be met together, no candidate adds anything, fewer sensors are allowed than the risk
         measure needs, or the solver is not available.
     """
+    check_solver(limits.solver)
     risk.require_sensors(problem.most_sensors)
     instance = make_instance(problem, cases, risk)
     incumbent = Incumbent(instance, limits.work(), describe)
@@ -99,7 +103,12 @@ def search_and_prove(
     yield from branches.start()
     if incumbent.proven:
         return name
+    few = instance.count <= GREEDY_SENSORS
+    if few and (yield from branches.run_greedily(QUICK_SHARE)):
+        return name
     yield from search.restarts(RESTART_SHARE * work.left)
+    if few and (yield from branches.run_greedily(GREEDY_SHARE)):
+        return name
     rest, part = branches.left(), work.part(PROGRAM_SHARE * work.left)
     tight = isinstance(instance.blocks[0].g, Steps) and incumbent.gap <= TIGHT_GAP
     if instance.is_plain and (tight or solver != "auto") and is_affordable(instance.of(rest), part):

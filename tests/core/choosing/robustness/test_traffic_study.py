@@ -1,4 +1,4 @@
-"""What placements hold in traffic, where road users are, and the charts of both."""
+"""Placements for the empty road and for traffic, evaluated at held-out instants."""
 
 import math
 from dataclasses import replace
@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from seip_addon.core.choosing.placement.objective import Objective, placement_problem
-from seip_addon.core.choosing.robustness.traffic_study import traffic_scenarios, traffic_study
+from seip_addon.core.choosing.robustness.traffic_study import traffic_placements, traffic_scenarios, traffic_study
 from seip_addon.core.progress import finish
 from seip_addon.core.sensing.lidar.catalogue import load_catalogue
 from seip_addon.core.sensing.scenarios.traffic_instants import spread_instants
@@ -53,7 +53,8 @@ def laid_out():
 def study(laid_out):
     around, problem = laid_out
     scenarios = finish(traffic_scenarios(around, problem, spread_instants([queue(1), queue(2)], 6, 0)))
-    return scenarios, finish(traffic_study(around, problem, scenarios, spread_instants([queue(3)], 8, 1)))
+    placements = finish(traffic_placements(problem, scenarios))
+    return scenarios, finish(traffic_study(around, problem, placements, 6, spread_instants([queue(3)], 8, 1)))
 
 
 @pytest.mark.slow
