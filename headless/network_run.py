@@ -10,7 +10,6 @@ from pathlib import Path
 
 from headless.network_tasks import (
     SURVEY_FILES,
-    USAGE,
     Client,
     Failure,
     Files,
@@ -371,7 +370,7 @@ def _placed(
             continue
         mark.unlink(missing_ok=True)
         for path in site.folder.iterdir():
-            if path.name not in {*SURVEY_FILES, SEARCHES, USAGE}:
+            if path.name not in {*SURVEY_FILES, SEARCHES}:
                 path.unlink()
         if one.chosen:
             wanted.append((site, one, key))

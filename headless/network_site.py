@@ -1,6 +1,7 @@
-"""Survey one site of a network, or write the placement that is taken there, in a process of its own.
+"""Survey sites of a network, or write the placements that are taken there, in a process of its own.
 
-`headless.network_tasks` starts it; the folder that it names holds the request and receives the files.
+`headless.network_tasks` starts it and writes a folder on each line of its standard input; the folder holds the request
+and receives the files.
 """
 
 import pickle
@@ -10,7 +11,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from headless import runtime
-from headless.network_tasks import FORMAT, MEMORY, PLACED_FILES, REQUEST, SURVEY_FILES, PlaceJob, SurveyJob
+from headless.network_tasks import DONE, FORMAT, MEMORY, PLACED_FILES, REQUEST, SURVEY_FILES, PlaceJob, SurveyJob
 
 import bpy
 
@@ -32,21 +33,22 @@ from seip_addon.scene.read import read_scene
 SCENE, VISIBILITY, PROBLEM = SURVEY_FILES[0], SURVEY_FILES[1], SURVEY_FILES[3]
 
 
-def main(argv: list[str]) -> None:
-    """Do what the request in a folder asks for."""
-    (name,) = argv
-    folder = Path(name)
-    job: SurveyJob | PlaceJob = pickle.loads((folder / REQUEST).read_bytes())  # noqa: S301 -- written by the caller
+def main(_: list[str]) -> None:
+    """Do what the requests in folders ask for, until one fails."""
     if sys.platform != "win32":
         import resource  # noqa: PLC0415 -- not on Windows
 
         resource.setrlimit(resource.RLIMIT_DATA, (MEMORY, MEMORY))
-    try:
-        finish(_survey(folder, job) if isinstance(job, SurveyJob) else _place(folder, job))
-    except MemoryError as error:
-        raise SeipError(
-            f"the site needs more than {MEMORY / 2**30:.0f} GiB: shorten the approaches by --approaches"
-        ) from error
+    for line in sys.stdin:
+        folder = Path(line.rstrip("\n"))
+        job: SurveyJob | PlaceJob = pickle.loads((folder / REQUEST).read_bytes())  # noqa: S301 -- written by the caller
+        try:
+            finish(_survey(folder, job) if isinstance(job, SurveyJob) else _place(folder, job))
+        except MemoryError as error:
+            raise SeipError(
+                f"the site needs more than {MEMORY / 2**30:.0f} GiB: shorten the approaches by --approaches"
+            ) from error
+        runtime.print_line(DONE)
 
 
 def _survey(folder: Path, job: SurveyJob) -> Generator[Progress, None, None]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import pickle
 import subprocess
@@ -26,12 +25,12 @@ FORMAT = "seip-network-site/1"
 REQUEST = "request.pickle"
 SURVEY_FILES = ("site.blend", "visibility.npz", "visibility.returns.npz", "problem.npz", "site.xodr")
 """Files of the survey of a site; the last two need not exist in all of them."""
-USAGE = "usage.json"
-"""Processor time and memory of the survey of a site, kept apart from results."""
 PLACED_FILES = "placed"
 """Folder of the files of a placement, below that of the request."""
+DONE = "the request is done"
+"""Line that the process of sites writes after each request."""
 MEMORY = 4 << 30
-"""Bytes that the process of a site may use: ten times what a typical site needs."""
+"""Bytes that the process of sites may use: ten times what a typical site needs."""
 IN_FLIGHT = 3  # tasks for each worker that are submitted and not finished: enough to keep it busy
 
 Client = Any
@@ -99,7 +98,7 @@ def survey_version() -> str:
 
 
 def survey_site(job: SurveyJob) -> Files | Failure:
-    """Build and survey a site in a process of its own, whose memory is limited and returned when it ends."""
+    """Build and survey a site in a process of its own, whose memory is limited."""
     return _in_process(job, {job.file: job.content}, SURVEY_FILES)
 
 
@@ -129,33 +128,60 @@ def _in_process(job: SurveyJob | PlaceJob, files: Files, wanted: Sequence[str] |
         for file, content in files.items():
             (folder / file).write_bytes(content)
         (folder / REQUEST).write_bytes(pickle.dumps(job))
-        before = _usage()
-        done = subprocess.run(  # noqa: S603 -- this program itself
-            [sys.executable, "-m", "headless.network_site", name],
-            stdin=subprocess.DEVNULL,
-            capture_output=True,
-            cwd=Path(__file__).resolve().parents[1],
-            check=False,
-        )
-        if done.returncode:
-            reason = _reason(done.stderr.decode(errors="replace"), done.returncode)
+        process = _idle.pop() if _idle else _SiteProcess()
+        if reason := process.run(name):
             return Failure(reason.replace(f"{name}{os.sep}", ""))
+        _idle.append(process)
         if wanted is None:
             return {path.name: path.read_bytes() for path in sorted((folder / PLACED_FILES).iterdir())}
-        results = {file: (folder / file).read_bytes() for file in wanted if (folder / file).exists()}
-        after = _usage()
-        used = {"processor_s": round(after[0] - before[0], 2), "peak_memory_mb": round(after[1])}
-        return {**results, USAGE: json.dumps(used).encode()}
+        return {file: (folder / file).read_bytes() for file in wanted if (folder / file).exists()}
 
 
-def _usage() -> tuple[float, float]:
-    """Return processor seconds and peak memory (MB) of the processes that this one has started; 0 on Windows."""
-    try:
-        import resource  # noqa: PLC0415 -- not on Windows
-    except ImportError:
-        return 0.0, 0.0
-    used = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return used.ru_utime + used.ru_stime, used.ru_maxrss / 1024.0
+class _SiteProcess:
+    """A process of `headless.network_site`, which does one request after the other, and ends when one fails."""
+
+    def __init__(self) -> None:
+        self._errors = tempfile.TemporaryFile()  # noqa: SIM115 -- open as long as the process
+        self._process = subprocess.Popen(
+            [sys.executable, "-m", "headless.network_site"],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=self._errors,
+            cwd=Path(__file__).resolve().parents[1],
+        )
+
+    def run(self, folder: str) -> str:
+        """Do the request in a folder; return why that failed, or ""."""
+        requests, lines = self._process.stdin, self._process.stdout
+        assert requests is not None and lines is not None  # noqa: S101, PT018 -- both are pipes
+        try:
+            requests.write(f"{folder}\n".encode())
+            requests.flush()
+        except BrokenPipeError:  # it has ended before
+            pass
+        for line in lines:
+            if line.strip() == DONE.encode():
+                return ""
+        status = self._process.wait()
+        self._errors.seek(0)
+        reason = _reason(self._errors.read().decode(errors="replace"), status)
+        self.close()
+        return reason
+
+    def close(self) -> None:
+        """Let the process end."""
+        self._process.communicate()
+        self._errors.close()
+
+
+_idle: list[_SiteProcess] = []
+"""Processes of this worker without a request."""
+
+
+def end_site_processes() -> None:
+    """End the processes of this worker that have no request, which returns their memory."""
+    while _idle:
+        _idle.pop().close()
 
 
 def _reason(text: str, status: int) -> str:
@@ -211,6 +237,7 @@ def run_jobs(
             if following is not None:
                 submit(following)
             yield number, result
+        client.run(end_site_processes)
     except KilledWorker as error:
         raise SeipError(
             f"several workers died on one task ({error}): give them more memory, and run the command again to go on"
