@@ -262,7 +262,7 @@ def test_enter_ends_the_search_with_the_best_placement_so_far(tmp_path):
     )
     os.close(theirs)
     shown = b""
-    while b"covered so far" not in shown:
+    while b"gap at most" not in shown:
         shown += os.read(ours, 4096)
     os.write(ours, b"\n")
     shown += b"".join(iter(partial(_read_terminal, ours), b""))
