@@ -74,6 +74,7 @@ def solve(
         measure needs, or the solver is not available.
     """
     check_solver(limits.solver)
+    check_solver(limits.solver)
     risk.require_sensors(problem.most_sensors)
     instance = make_instance(problem, cases, risk)
     incumbent = Incumbent(instance, limits.work(), describe)
