@@ -49,7 +49,7 @@ from seip_addon.core.world.openstreetmap.site import is_extract
 from seip_addon.core.world.openstreetmap.streets import importance, is_street
 
 MOST_SENSORS = 8
-SECONDS_PER_SITE, MEMORY_PER_WORKER, DISK_PER_SITE = 190.0, 1.5, 6.0
+SECONDS_PER_SITE, MEMORY_PER_WORKER, DISK_PER_SITE = 20.0, 1.5, 6.0
 """Seconds of a worker, GiB and MB for a typical site; the seconds are those of `make network` on two workers."""
 LONG = 7200.0  # seconds from which a run must be confirmed
 _MOST_BYTES = 1 << 26
