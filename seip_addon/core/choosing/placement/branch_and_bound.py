@@ -25,6 +25,7 @@ from .concave import ConcaveSum
 from .incumbent import Incumbent
 
 ROOT_STEPS, NODE_STEPS = 300, 8  # largest number of steps of the bound at the root, and at each other node
+ROOT_SHARE = 0.4  # share of the work for the bounds of the first nodes
 ROUND = 25  # steps at the root after which candidates that the bound rules out are dropped
 LEAST_FALL = 0.001  # share of the bound that a round must gain for another one
 FEW_SENSORS, DEEP_SHARE, GOAL_SHARE = 5, 0.36, 0.7
@@ -118,7 +119,7 @@ class BranchAndBound:
         self._open: list[_Node] = []
         self._waiting: list[_Node] = []
         self._goal = -math.inf
-        self._by_gains_only = False
+        self._by_gains_only, self._spare = False, 0.0
 
     @property
     def bound(self) -> float:
@@ -137,6 +138,7 @@ class BranchAndBound:
         """Bound all placements, and open the first nodes: one, or one for each composition that spends the budget."""
         every = np.arange(len(self.instance))
         parameters = self._block.start(self._block.together(self.incumbent.chosen))
+        self._spare = (1.0 - ROOT_SHARE) * self.incumbent.work.left
         for composition in compositions(self.instance):
             root = _Node(-math.inf, 0, np.zeros(0, dtype=np.int64), every, every, parameters, composition)
             yield from self._start_from(root)
@@ -161,7 +163,7 @@ class BranchAndBound:
                 problem = self._restricted(problem, within)
                 lower = bound_at(problem.block, problem.rest, problem.base, bound.parameters, problem.raised)
                 bound = replace(lower, step=bound.step)
-            if before - bound.value < LEAST_FALL * bound.value or self.incumbent.work.left <= 0:
+            if before - bound.value < LEAST_FALL * bound.value or self.incumbent.work.left <= self._spare:
                 break
         self.incumbent.offer(problem.left[bound.selection.picked])
         limit = min(bound.value, self._total + self._rounding)

@@ -29,6 +29,7 @@ QUICK_SHARE, GREEDY_SHARE = 0.08, 0.75
 GREEDY_SENSORS = 5  # sensors up to which that often ends with a proof
 RESTART_SHARE = 0.65  # share of what is left for restarts
 ROUNDS = 8  # rounds of fictitious play for the shares of scenarios
+SCENARIO_SHARE = 0.3  # the same over scenarios, whose placements begin from the nominal optimum
 PROGRAM_SHARE = 0.5  # share of what is left then for an integer program
 TIGHT_GAP = 0.01  # largest gap at which an integer program is tried without being asked for
 UNPROVEN = "the search ended before this placement was proven optimal: the gap is the most by which it may fall short"
@@ -107,7 +108,7 @@ def search_and_prove(
     few = instance.count <= GREEDY_SENSORS
     if few and (yield from branches.run_greedily(QUICK_SHARE)):
         return name
-    yield from search.restarts(RESTART_SHARE * work.left)
+    yield from search.restarts((RESTART_SHARE if instance.is_plain else SCENARIO_SHARE) * work.left)
     if few and (yield from branches.run_greedily(GREEDY_SHARE)):
         return name
     rest, part = branches.left(), work.part(PROGRAM_SHARE * work.left)
