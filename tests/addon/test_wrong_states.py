@@ -122,7 +122,7 @@ def test_the_best_so_far_can_be_used_while_a_search_runs_and_only_then(placed, m
     acceptance = Acceptance()
     monkeypatch.setattr(session, "running", RunningWork("seip.solve_placement", MagicMock(), acceptance=acceptance))
     assert not bpy.ops.seip.accept.poll()  # rays are still cast
-    SolverLimits(acceptance=acceptance).clock()
+    SolverLimits(acceptance=acceptance).work()
     assert bpy.ops.seip.accept() == {"FINISHED"}
     assert acceptance.accepted
 

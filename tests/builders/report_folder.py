@@ -9,10 +9,17 @@ from pathlib import Path
 import numpy as np
 import shapely
 
+from seip_addon.core.choosing.placement.concave import relative_gap
 from seip_addon.core.choosing.placement.deployment import deploy
-from seip_addon.core.choosing.placement.objective import Objective, Solution, placement_constraints, placement_problem
-from seip_addon.core.choosing.placement.price_front import price_front
-from seip_addon.core.choosing.placement.problem import Placement, relative_gap
+from seip_addon.core.choosing.placement.front import front_of
+from seip_addon.core.choosing.placement.objective import (
+    FrontPoint,
+    Objective,
+    Solution,
+    placement_constraints,
+    placement_problem,
+)
+from seip_addon.core.choosing.placement.problem import Placement
 from seip_addon.core.choosing.placement.returns_summary import CrossingReturns
 from seip_addon.core.geometry.geo_reference import GeoReference
 from seip_addon.core.output.pictures.close_ups import save_close_ups
@@ -64,7 +71,13 @@ def make_folder(
     solution = replace(make_solution(example, goal, **found), crossings=(CROSSING,))
     problem = placement_problem(example.site, example.visible, example.models, goal)
     if effort:
-        solution = replace(solution, front=finish(price_front(problem, solution, effort)))
+        whole, own = len(example.site.targets), len(solution.placement.chosen)
+        front = finish(front_of(problem, solution.placement, range(own, own + 1), effort)).items()
+        points = (
+            FrontPoint(count, one.objective / whole, one.price, (one.bound - one.objective) / whole)
+            for count, one in front
+        )
+        solution = replace(solution, front=tuple(points))
     deployment = solution.deployment
     settings = {
         "grid_spacing_m": 2.0,

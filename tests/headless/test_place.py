@@ -120,12 +120,13 @@ def test_the_same_run_gives_the_same_bytes(folder, tmp_path, run):
 
 
 @pytest.mark.long
-def test_eight_sensors_at_the_shipped_junction_are_proven_the_best(tmp_path):
-    """A change of the branch and bound that cuts less than this one does ends at the limit without a proof."""
-    options = ["--sensor", "type1", "--count", "8", "--effort", "120", "--no-render"]
+def test_eight_sensors_at_the_shipped_junction_are_the_proven_best_of_before(tmp_path):
+    """Branch and bound of 2026 proved 3,621 targets in 78 processor seconds, which this search only reaches."""
+    options = ["--sensor", "type1", "--count", "8", "--no-render"]
     place.main([str(SCENE), *options, "-o", str(tmp_path)])
     objective = load_placement(tmp_path / "placement.json").objective
-    assert (objective.status, objective.gap) == ("optimal", 0.0)
+    assert objective.value == 3621
+    assert objective.gap < 0.15
 
 
 def test_another_goal_uses_the_stored_grid_and_no_file_of_an_earlier_result_stays(folder, tmp_path, run):
@@ -262,7 +263,7 @@ def test_enter_ends_the_search_with_the_best_placement_so_far(tmp_path):
     )
     os.close(theirs)
     shown = b""
-    while b"covered so far" not in shown:
+    while b"gap at most" not in shown:
         shown += os.read(ours, 4096)
     os.write(ours, b"\n")
     shown += b"".join(iter(partial(_read_terminal, ours), b""))

@@ -89,6 +89,36 @@ def test_acceptance_ends_the_search_for_other_numbers_of_sensors(small_survey):
     assert solution.deployment.returns.front == ()
 
 
+@pytest.mark.parametrize("criterion", ["road", "returns"])
+def test_front_has_the_solution_at_its_own_number_and_more_sensors_are_never_worse(small_survey, criterion):
+    solution = finish(place(small_survey, Objective(count=2, criterion=criterion)))
+    found = finish(with_context(small_survey, solution))
+    summary = found.deployment.returns
+    points = found.front if summary is None else summary.front
+    assert [point.count for point in points] == [1, 2, 3, 4]
+    values = [point.coverage if summary is None else point.returns for point in points]
+    assert values == sorted(values)
+    own = solution.deployment.coverage if summary is None else np.expm1(solution.placement.objective)
+    assert values[1] == pytest.approx(own)
+    assert points[1].price == solution.placement.price
+    assert (points[1].missed if summary is None else points[1].gap) == 0.0
+
+
+def test_a_budget_certifies_no_more_sensors_than_it_pays(small_survey):
+    dearest = max(model.price for model in small_survey.models.values())
+    goal = Objective(count=3, criterion="road", budget=2 * dearest)
+    two, three = (finish(place(small_survey, Objective(count=count, criterion="road"))) for count in (2, 3))
+    found = finish(with_context(small_survey, finish(place(small_survey, goal))))
+    assert [point.coverage for point in found.front[1:3]] == pytest.approx(
+        [two.deployment.coverage, three.deployment.coverage]
+    )
+
+
+def test_placements_over_scenarios_have_no_front(small_survey):
+    solution = finish(place(small_survey, Objective(count=2, failures="mean")))
+    assert finish(with_context(small_survey, solution)).front == ()
+
+
 def test_traffic_scenarios_need_runs(small_survey):
     with pytest.raises(SeipError, match="traffic"):
         finish(place(small_survey, Objective(count=1, scenarios=Scenarios(kind="traffic"))))

@@ -24,10 +24,12 @@ from .bounds import Bound, Composition, Rest, bound_at, compositions, falling_bo
 from .concave import ConcaveSum
 from .incumbent import Incumbent
 
-ROOT_STEPS, NODE_STEPS = 300, 12  # largest number of steps of the bound at the root, and at each other node
+ROOT_STEPS, NODE_STEPS = 300, 8  # largest number of steps of the bound at the root, and at each other node
 ROUND = 25  # steps at the root after which candidates that the bound rules out are dropped
-LEAST_FALL = 0.002  # share of the bound that a round must gain for another one
-GOAL_SHARE = 0.7  # share of the gap that remains at the end of each stage
+LEAST_FALL = 0.001  # share of the bound that a round must gain for another one
+FEW_SENSORS, DEEP_SHARE, GOAL_SHARE = 5, 0.36, 0.7
+"""Share of the gap that remains at the end of each stage, up to a number of sensors and beyond it: with few sensors a
+stage ends soon, and a low goal spares the work of those between."""
 LEAST_GAP = 0.002  # gap below which the next stage is the last one
 TRIALS, LEAST_SUCCESS = 20, 0.2
 """Nodes of each depth whose bounds are lowered in any case, and share of them that must be cut for it to go on."""
@@ -215,7 +217,8 @@ class BranchAndBound:
         if not self._open:
             incumbent.close()
         distance = self.bound - incumbent.value
-        self._goal = incumbent.value + GOAL_SHARE * distance if distance > LEAST_GAP * self.bound else -math.inf
+        share = DEEP_SHARE if self.instance.count <= FEW_SENSORS else GOAL_SHARE
+        self._goal = incumbent.value + share * distance if distance > LEAST_GAP * self.bound else -math.inf
         return not self._open
 
     def _note(self, bound: float) -> None:

@@ -69,7 +69,7 @@ class _Cheapest:
         self._work = limits.work()
         self._instance = make_instance(problem)
         self._whole = math.fsum(problem.weights) / self._instance.unit
-        goal = share * self._whole - self._instance.slack
+        goal = share * self._whole * (1 - TIE_TOLERANCE)
         self._goal = math.ceil(goal) if self._instance.step == 1 else goal
         self._equal_prices = bool(np.ptp(self._instance.price) == 0)
 

@@ -17,7 +17,7 @@ from tests.builders.placement_problems import HALVES, row_problem
     [
         ([3.0, 9.0], (3.0, True)),
         ([0.5, 0.75], (0.25, True)),
-        ([2.0**40, 2.0**40 + 1], (1.0, False)),
+        ([2.0**40, 2.0**40 + 1], (1.0, True)),
         ([1.0, 2.0**40 + 1], (1.0, True)),
         ([1.0, np.pi], (1.0, False)),
         ([1.0, 2.0**60], (1.0, False)),

@@ -82,7 +82,7 @@ def test_value_in_the_program_is_that_of_the_instance(returns):
 
 def test_a_named_solver_proves_what_branch_and_bound_leaves(monkeypatch):
     monkeypatch.setattr("seip_addon.core.choosing.placement.branch_and_bound.ROOT_STEPS", 0)
-    usual, named = (finish(solve(hard_problem(20, 60, count=3), SolverLimits(one))) for one in ("auto", "highs"))
+    usual, named = (finish(solve(hard_problem(20, 60, count=6), SolverLimits(one))) for one in ("auto", "highs"))
     assert usual.solver == "branch and bound"
     assert named.solver.startswith("branch and bound, HiGHS")
     for one in (usual, named):

@@ -22,8 +22,8 @@ def _sites():
         yield pytest.param(site, id=name, marks=[there, *([needs_sumo] if source.suffix == ".osm" else [])])
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("site", _sites())
+@pytest.mark.long
+@pytest.mark.parametrize("site", list(_sites()))
 def test_a_plain_search_finds_nothing_better(site, tmp_path):
     for case in real_cases(site, tmp_path):
         problem = problem_of(case)

@@ -104,14 +104,14 @@ def test_more_effort_gives_no_less_and_any_effort_a_valid_bound():
     placements = [finish(solve(problem, SolverLimits(effort=effort))) for effort in (1e-6, 0.01, 0.1, 8.0)]
     values, bounds = ([getattr(one, name) for one in placements] for name in ("objective", "bound"))
     best = placements[-1]
-    assert best.status == "optimal"
+    assert (placements[0].status, best.status) == ("feasible", "optimal")
     assert (best.gap, best.notes) == (0.0, ())
     assert values == sorted(values)
     assert bounds == sorted(bounds, reverse=True)
     for one in placements[:-1]:
         assert one.objective <= best.objective <= one.bound
         assert one.gap == pytest.approx((one.bound - one.objective) / one.objective)
-        assert one.notes == (UNPROVEN,)
+        assert one.notes == (() if one.status == "optimal" else (UNPROVEN,))
         assert one.objective == one.covered == problem.value(one.chosen)
 
 
@@ -138,13 +138,13 @@ def test_acceptance_ends_the_search_at_once_with_a_placement(g, after):
 
 
 def test_reports_show_a_placement_and_its_gap_and_these_only_improve():
-    problem = hard_problem(40, 200, count=4)
+    problem = hard_problem(60, 300)
     steps = list(
         solve(problem, SolverLimits(effort=0.5), describe=lambda chosen, value: f"{value:.0f} of {len(chosen)}")
     )
     found = [float(step.best.split()[0]) for step in steps if step.best]
     gaps = [step.gap for step in steps if step.gap is not None]
-    assert len(found) > len(steps) - 6
+    assert len(found) > len(steps) - 10
     assert found == sorted(found)
     assert len(gaps) > 3
     assert gaps == sorted(gaps, reverse=True)
