@@ -24,7 +24,7 @@ from .risk import NOMINAL, Risk
 from .search import Search, without_idle
 from .search_limits import DEFAULT_LIMITS, SolverLimits, Work
 
-QUICK_SHARE, GREEDY_SHARE = 0.08, 0.75
+QUICK_SHARE, GREEDY_SHARE = 0.04, 0.95
 """Shares of what is left for branch and bound by gains only, before and after the restarts."""
 GREEDY_SENSORS = 5  # sensors up to which that often ends with a proof
 RESTART_SHARE = 0.65  # share of what is left for restarts
