@@ -28,8 +28,8 @@ QUICK_SHARE, GREEDY_SHARE = 0.04, 0.95
 """Shares of what is left for branch and bound by gains only, before and after the restarts."""
 GREEDY_SENSORS = 5  # sensors up to which that often ends with a proof
 RESTART_SHARE = 0.65  # share of what is left for restarts
-ROUNDS = 8  # rounds of fictitious play for the shares of scenarios
 SCENARIO_SHARE = 0.3  # the same over scenarios, whose placements begin from the nominal optimum
+ROUNDS = 8  # rounds of fictitious play for the shares of scenarios
 PROGRAM_SHARE = 0.5  # share of what is left then for an integer program
 TIGHT_GAP = 0.01  # largest gap at which an integer program is tried without being asked for
 UNPROVEN = "the search ended before this placement was proven optimal: the gap is the most by which it may fall short"
@@ -74,7 +74,6 @@ def solve(
         The constraints cannot be met together, no candidate adds anything, fewer sensors are allowed than the risk
         measure needs, or the solver is not available.
     """
-    check_solver(limits.solver)
     check_solver(limits.solver)
     risk.require_sensors(problem.most_sensors)
     instance = make_instance(problem, cases, risk)
