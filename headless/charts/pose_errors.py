@@ -1,6 +1,7 @@
 """Charts of coverage under pose errors, and of the price of robust placements."""
 
 import os
+from collections.abc import Sequence
 from pathlib import Path
 from textwrap import fill
 
@@ -11,10 +12,8 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import PercentFormatter
 
 from seip_addon.core.choosing.placement.objective import Solution
-from seip_addon.core.choosing.robustness.pose_error_evaluation import PoseErrorEvaluation
+from seip_addon.core.choosing.robustness.comparison import Comparison, EvaluatedPlacement
 from seip_addon.core.choosing.robustness.pose_study import PoseStudy
-from seip_addon.core.choosing.robustness.robust_study import Contender, RobustStudy
-from seip_addon.core.choosing.robustness.traffic_study import TrafficStudy
 from seip_addon.core.counts import counted
 from seip_addon.core.estimates import IntervalEstimate
 from seip_addon.core.output.pictures.chart_style import (
@@ -37,15 +36,17 @@ def save_evaluation_charts(folder: Path, survey: Survey, solution: Solution) -> 
     evaluation, name = solution.evaluation, survey.site.name
     for picture in (*POSE_ERROR_PICTURES, *TRAFFIC_PICTURES):
         (folder / picture).unlink(missing_ok=True)
-    if isinstance(evaluation, PoseErrorEvaluation) and evaluation.pose_study is not None:
+    if evaluation is None:
+        return
+    if evaluation.pose_study is not None:
         spread, losses, frontier = (folder / picture for picture in POSE_ERROR_PICTURES)
-        save_spread_chart(spread, evaluation.study, f"{name}: coverage under pose errors")
+        save_spread_chart(spread, [evaluation], f"{name}: coverage under pose errors")
         save_loss_chart(losses, evaluation.pose_study, f"{name}: what costs coverage")
-        save_frontier_chart(frontier, evaluation.study, f"{name}: what robustness costs and saves")
-    if isinstance(evaluation, TrafficStudy):
+        save_frontier_chart(frontier, [evaluation], f"{name}: what robustness costs and saves")
+    if evaluation.scenarios.kind == "traffic":
         time_seen, traffic = (folder / picture for picture in TRAFFIC_PICTURES)
-        title = f"{name}: share of time seen, {evaluation.road_users:.0f} road users at a time"
-        save_time_map(time_seen, survey.geometry, survey.site, solution.deployment, evaluation.traffic, title)
+        title = f"{name}: share of time seen, {evaluation.robust.road_users:.0f} road users at a time"
+        save_time_map(time_seen, survey.geometry, survey.site, solution.deployment, evaluation.robust, title)
         sensors = counted(len(solution.deployment.sensors), "sensor")
         save_traffic_chart(traffic, evaluation, sensors, f"{name}: empty road and traffic")
 
@@ -56,7 +57,7 @@ X_LETTERS, Y_LETTERS, LEGEND_LETTERS = 80, 34, 44
 """Characters per line below the axis, next to it, and in one of two columns of the legend."""
 
 
-def save_spread_chart(path: str | os.PathLike[str], study: RobustStudy, title: str) -> None:
+def save_spread_chart(path: str | os.PathLike[str], comparisons: Sequence[Comparison], title: str) -> None:
     """Draw the distribution of coverage over unseen draws for each placement, as PNG.
 
     Steps are empirical distribution functions. A mark on the 5 % line is the quantile with its interval; a tick on the
@@ -64,14 +65,14 @@ def save_spread_chart(path: str | os.PathLike[str], study: RobustStudy, title: s
     by several sensors.
     """
     figure, (axes,) = new_figure(*FIGURE_SIZE)
-    for row, contender in enumerate((*study.nominal, *study.robust)):
-        ordered = np.sort(contender.unseen)
+    for row, (label, placed) in enumerate(_labelled(comparisons)):
+        ordered = np.sort(placed.held_out)
         below = np.arange(1, len(ordered) + 1) / len(ordered)
         axes.step(ordered, below, where="post", color=colour(row), linewidth=1.6)
-        _interval(axes, contender.low, 0.05, colour(row), mark(row), _named(study, contender))
-        axes.plot(contender.undisturbed, 0.0, marker="|", markersize=14, color=colour(row), clip_on=False)
+        _interval(axes, placed.low, 0.05, colour(row), mark(row), label)
+        axes.plot(placed.nominal, 0.0, marker="|", markersize=14, color=colour(row), clip_on=False)
     axes.axhline(0.05, color=SOFT_INK, linewidth=0.8, linestyle=DASHED, zorder=0)
-    outcome = fill(f"{_outcome(study)}, share of the targets' weight (tick: as planned)", X_LETTERS)
+    outcome = fill(f"{_outcome(comparisons)}, share of the targets' weight (tick: as planned)", X_LETTERS)
     style_axes(axes, outcome, "share of draws that cover less")
     axes.set_ylim(0, 1)
     axes.xaxis.set_major_formatter(PercentFormatter(1.0, decimals=1))
@@ -97,31 +98,34 @@ def save_loss_chart(path: str | os.PathLike[str], study: PoseStudy, title: str) 
     save_chart(path, figure, title)
 
 
-def save_frontier_chart(path: str | os.PathLike[str], study: RobustStudy, title: str) -> None:
+def save_frontier_chart(path: str | os.PathLike[str], comparisons: Sequence[Comparison], title: str) -> None:
     """Draw the 5 % quantile over unseen draws against the planned coverage of each placement, as PNG."""
     figure, (axes,) = new_figure(*FIGURE_SIZE)
-    for row, contender in enumerate((*study.nominal, *study.robust)):
-        low = contender.low
-        axes.plot([contender.planned] * 2, [low.low, low.high], color=colour(row), linewidth=1.2)
-        label = _named(study, contender)
-        axes.plot(contender.planned, low.value, mark(row), color=colour(row), label=label)
-    style_axes(axes, "coverage as planned", fill(f"5 % quantile of {_outcome(study)} over unseen draws", Y_LETTERS))
+    for row, (label, placed) in enumerate(_labelled(comparisons)):
+        low = placed.low
+        axes.plot([placed.planned] * 2, [low.low, low.high], color=colour(row), linewidth=1.2)
+        axes.plot(placed.planned, low.value, mark(row), color=colour(row), label=label)
+    style_axes(
+        axes, "coverage as planned", fill(f"5 % quantile of {_outcome(comparisons)} over unseen draws", Y_LETTERS)
+    )
     for axis in (axes.xaxis, axes.yaxis):
         axis.set_major_formatter(PercentFormatter(1.0, decimals=1))
     add_legend(figure, [axes], columns=2)
     save_chart(path, figure, title)
 
 
-def _outcome(study: RobustStudy) -> str:
+def _labelled(comparisons: Sequence[Comparison]) -> list[tuple[str, EvaluatedPlacement]]:
+    """Return each placement with its name; of several nominal optima, each with its evaluated quantity."""
+    nominal = list(dict.fromkeys(one.nominal for one in comparisons))
+    named = [(f"{one.name}: {one.risk.describe_outcome()}" if len(nominal) > 1 else one.name, one) for one in nominal]
+    named += [(one.robust.name, one.robust) for one in comparisons]
+    return [(fill(name, LEGEND_LETTERS), placed) for name, placed in named]
+
+
+def _outcome(comparisons: Sequence[Comparison]) -> str:
     """Return the name of the evaluated quantity if it is the same for all placements, otherwise "coverage"."""
-    return study.nominal[0].evaluated_by.describe_outcome() if len(study.nominal) == 1 else "coverage"
-
-
-def _named(study: RobustStudy, contender: Contender) -> str:
-    """Return the name of a placement; of several nominal optima, each with its evaluated quantity."""
-    several = len(study.nominal) > 1 and contender in study.nominal
-    name = f"{contender.name}: {contender.evaluated_by.describe_outcome()}" if several else contender.name
-    return fill(name, LEGEND_LETTERS)
+    outcomes = {one.robust.risk.describe_outcome() for one in comparisons}
+    return outcomes.pop() if len(outcomes) == 1 else "coverage"
 
 
 def _interval(

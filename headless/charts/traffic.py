@@ -10,7 +10,7 @@ from matplotlib.colors import LinearSegmentedColormap, Normalize
 from matplotlib.ticker import PercentFormatter
 
 from seip_addon.core.choosing.placement.deployment import Deployment
-from seip_addon.core.choosing.robustness.traffic_study import TrafficEvaluation, TrafficStudy
+from seip_addon.core.choosing.robustness.comparison import Comparison, EvaluatedPlacement
 from seip_addon.core.estimates import IntervalEstimate
 from seip_addon.core.geometry.plan import closed, outline
 from seip_addon.core.output.pictures.chart_style import (
@@ -41,16 +41,16 @@ def save_time_map(
     geometry: SceneGeometry,
     site: Site,
     deployment: Deployment,
-    placed: TrafficEvaluation,
+    placed: EvaluatedPlacement,
     title: str,
 ) -> None:
     """Draw the share of time for which each target is visible, as PNG."""
     limits, shape = limits_around(site.region.bounds, MARGIN_SHARE)
     figure, (panel,) = new_figure(PICTURE_SIDE + 0.9, PICTURE_SIDE * shape + 0.9)
     panel.set(**limits)
-    panel.set_title(f"road: {placed.mean.describe(1)}, empty {placed.empty:.1%}", color=INK, fontsize=10)
+    panel.set_title(f"road: {placed.mean.describe(1)}, empty {placed.nominal:.1%}", color=INK, fontsize=10)
     panel.set(xticks=(), yticks=())
-    squares, colours = target_squares(site.targets)[:, :, :2], TIME_CMAP(placed.time)
+    squares, colours = target_squares(site.targets)[:, :, :2], TIME_CMAP(placed.seen[1:].mean(axis=0))
     draw_polygons(panel, squares, facecolors=colours, edgecolors="none", antialiaseds=False, zorder=1)
     _draw_place(panel, geometry)
     figure.draw_without_rendering()  # after the last change of the layout that moves data on the page
@@ -63,7 +63,7 @@ def save_time_map(
     save_chart(path, figure, title)
 
 
-def save_traffic_chart(path: str | os.PathLike[str], study: TrafficStudy, sensors: str, title: str) -> None:
+def save_traffic_chart(path: str | os.PathLike[str], comparison: Comparison, sensors: str, title: str) -> None:
     """Draw coverage on the empty road and in traffic, for placements optimised without and with traffic, as PNG.
 
     Parameters
@@ -72,13 +72,13 @@ def save_traffic_chart(path: str | os.PathLike[str], study: TrafficStudy, sensor
         Number and types of the sensors, like ``2 × type1``.
     """
     figure, (shares, changes) = new_figure(11.5, 4.6, 2)
-    empty, traffic = study.empty, study.traffic
-    _bar(shares, -1, IntervalEstimate(empty.empty, empty.empty, empty.empty), "empty road")
+    empty, traffic = comparison.nominal, comparison.robust
+    _bar(shares, -1, IntervalEstimate(empty.nominal, empty.nominal, empty.nominal), "empty road")
     _bar(shares, 0, empty.mean, "in traffic")
     _bar(shares, 1, traffic.mean, "in traffic, placed on traffic")
     shares.set_ylabel("share of the road seen", color=INK)
     _dot(changes, -0.5, negative(empty.loss), 1, "change by traffic")
-    _dot(changes, 0.5, traffic.more_than(empty), 2, "gain by placing on traffic")
+    _dot(changes, 0.5, comparison.gain, 2, "gain by placing on traffic")
     changes.axhline(0.0, color=SOFT_INK, linewidth=0.8, zorder=0)
     changes.set_ylabel("change, 95 % interval", color=INK)
     for axes, decimals in ((shares, 0), (changes, 1)):
