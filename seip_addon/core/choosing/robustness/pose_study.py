@@ -14,8 +14,7 @@ from ...arrays import Float
 from ...estimates import IntervalEstimate, mean_of, quantile_of
 from ...progress import Progress
 from ...sensing.scenarios.pose_errors import ERROR_KINDS, PoseErrors
-from ...sensing.scenarios.scenario_visibility import ScenarioVisibility
-from ...sensing.scenarios.visibility_under_errors import draws_for, visibility_under_errors
+from ...sensing.scenarios.visibility_under_errors import visibility_under_errors
 from ...sensing.visibility.surroundings import Surroundings
 from ..placement.deployment import Deployment
 
@@ -99,14 +98,11 @@ def pose_study(
     poses = np.array([sensor.pose for sensor in deployment.sensors], dtype=np.int64)
     every, planned = np.arange(len(poses)), deployment.rows
 
-    def views(errors: PoseErrors, draws: int) -> Generator[Progress, None, ScenarioVisibility]:
-        return (yield from visibility_under_errors(around, poses, draws_for(around, poses, errors, draws, seed)))
-
-    together = yield from views(errors, draws[0])
+    together = yield from visibility_under_errors(around, poses, errors, draws[0], seed)
     by_kind = {}
     for kind in ERROR_KINDS:
         if draws[1] and getattr(errors, kind) > 0:
-            of_kind = yield from views(errors.alone(kind), draws[1])
+            of_kind = yield from visibility_under_errors(around, poses, errors.alone(kind), draws[1], seed)
             by_kind[kind] = of_kind.seen_by_any(every).mean(axis=1)
     return PoseStudy(
         errors=errors,

@@ -12,7 +12,7 @@ from ...progress import Progress
 from ...sensing.scenarios.scenario_visibility import ScenarioVisibility
 from ...sensing.scenarios.traffic_instants import Instants, spread_instants
 from ...sensing.scenarios.visibility_in_traffic import visibility_in_traffic
-from ...sensing.scenarios.visibility_under_errors import draws_for, visibility_under_errors
+from ...sensing.scenarios.visibility_under_errors import visibility_under_errors
 from ...sensing.traffic.trajectories import Trajectories
 from ...sensing.visibility.surroundings import Surroundings
 from ..placement.problem import Placement, PlacementProblem
@@ -113,8 +113,7 @@ class RobustProblem:
         if scenarios.kind == "traffic":
             instants = spread_instants(self.runs[held_out], number, seed)
             return (yield from visibility_in_traffic(self.around, poses, instants.obstacles())), instants
-        drawn = draws_for(self.around, poses, scenarios.pose_errors, number, seed)
-        return (yield from visibility_under_errors(self.around, poses, drawn)), None
+        return (yield from visibility_under_errors(self.around, poses, scenarios.pose_errors, number, seed)), None
 
 
 def solve_over(

@@ -13,7 +13,7 @@ from seip_addon.core.choosing.placement.search_limits import SolverLimits
 from seip_addon.core.choosing.robustness.robust_problem import RobustProblem
 from seip_addon.core.progress import finish
 from seip_addon.core.sensing.lidar.catalogue import load_catalogue
-from seip_addon.core.sensing.scenarios.visibility_under_errors import draws_for, visibility_under_errors
+from seip_addon.core.sensing.scenarios.visibility_under_errors import visibility_under_errors
 from seip_addon.core.sensing.visibility.grid import VisibilitySettings, compute_visibility
 from seip_addon.core.sensing.visibility.surroundings import Surroundings
 from tests.builders.synthetic_junction import junction_site
@@ -52,8 +52,8 @@ def test_placements_are_evaluated_by_the_outcome_they_were_chosen_for(laid_out):
     @cache
     def looks(*chosen):
         poses = np.array(chosen)
-        drawn = draws_for(around, poses, SCENARIOS.pose_errors, SCENARIOS.evaluated, SCENARIOS.seed + 1)
-        return finish(visibility_under_errors(around, poses, drawn))
+        sample = SCENARIOS.pose_errors, SCENARIOS.evaluated, SCENARIOS.seed + 1
+        return finish(visibility_under_errors(around, poses, *sample))
 
     for comparison, risk in zip(comparisons, LOSSES, strict=True):
         for evaluated in (comparison.robust, comparison.nominal):
