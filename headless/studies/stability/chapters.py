@@ -9,7 +9,6 @@ from pathlib import Path
 from headless.charts import pose_errors as pose_error_charts
 from headless.charts import traffic as traffic_charts
 
-from seip_addon.core.choosing.placement.deployment import deploy
 from seip_addon.core.choosing.placement.objective import DEFAULT_COUNT, Objective, placement_problem
 from seip_addon.core.choosing.placement.problem import PlacementProblem
 from seip_addon.core.choosing.placement.risk import Risk
@@ -162,8 +161,7 @@ def poses(scene: StudiedScene) -> Generator[Progress, None, Chapter]:
     """Study a placement under pose errors."""
     survey, errors = scene.survey, scene.scope.robust.pose_errors
     study = yield from _robust(scene, TAIL_RISKS)
-    chosen = study[0].nominal.placement.chosen
-    deployment = deploy(survey.site, survey.models, survey.grid.rows(chosen), chosen)
+    deployment = survey.deploy(study[0].nominal.placement.chosen)
     under_errors = yield from pose_study(surroundings(survey), deployment, errors, 0, scene.scope.draws)
     pose_error_charts.save_spread_chart(scene.charts / "spread.png", study, f"{scene.placed} under pose errors")
     pose_error_charts.save_loss_chart(scene.charts / "blame.png", under_errors, f"{scene.placed}: what costs coverage")
@@ -202,8 +200,7 @@ def traffic(scene: StudiedScene) -> Generator[Progress, None, Chapter]:
     problem = RobustProblem(surroundings(survey), scene.problem(scene.sensor), scenarios, split_runs(scene.runs))
     placements = yield from problem.placements([Risk()], survey.settings.limits)
     (study,) = yield from problem.compare(*placements)
-    chosen = study.robust.placement.chosen
-    deployment = deploy(survey.site, survey.models, survey.grid.rows(chosen), chosen)
+    deployment = survey.deploy(study.robust.placement.chosen)
     title = f"{scene.placed} in traffic"
     traffic_charts.save_time_map(
         scene.charts / "time_seen.png", survey.geometry, survey.site, deployment, study.robust, title
@@ -226,8 +223,7 @@ def weather(scene: StudiedScene) -> Generator[Progress, None, Chapter]:
     survey = scene.survey
     study = yield from weather_study(survey.geometry, survey.settings)
     best = yield from solve(scene.problem(scene.sensor), survey.settings.limits)
-    deployment = deploy(survey.site, survey.models, survey.grid.rows(best.chosen), best.chosen)
-    sensors = deployment.sensors
+    sensors = survey.deploy(best.chosen).sensors
     rows = weather_rows(study, untouched_types(survey, scene.placed, sensors))
     limits_charts.save_weather_chart(scene.charts / "weather.png", study, f"{scene.name} in rain and fog")
     caption = "Coverage by weather: placements for clear air and for the weather, and sensors with a longer range"

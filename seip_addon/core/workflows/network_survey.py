@@ -97,8 +97,6 @@ def taken_solution(survey: Survey, objective: Objective, taken: SolvedBudget) ->
         gap=0.0 if optimal else math.expm1(bound - value) if of_returns else relative_gap(value, bound),
         status="optimal" if optimal else "feasible",
         solver="network allocation",
-        seconds=0.0,
-        covered=covered,
         price=taken.price,
         notes=("the money at this site is its share of the budget of a network",),
     )

@@ -175,7 +175,7 @@ def _over_scenarios(
     robust = _robust_problem(survey, objective, runs)
     nominal, placements = yield from robust.placements([measure], limits)
     placement = placements[measure]
-    deployment = deploy(survey.site, survey.models, survey.grid.rows(placement.chosen), placement.chosen)
+    deployment = survey.deploy(placement.chosen)
     compared = _compared(robust, nominal, placements, deployment)
     evaluation = yield from until_accepted(compared, limits.acceptance, None)
     note = f"{CHOSEN_FOR}{_purpose(robust.scenarios, measure)}: objective, bound and gap refer to that"

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from ..arrays import Float, Integer
 from ..choosing.placement.concave import LOG_RETURNS
-from ..choosing.placement.deployment import deploy
 from ..choosing.placement.objective import (
     CHOSEN_FOR,
     Objective,
@@ -101,7 +100,7 @@ def returns_solution(
         replace(placement, notes=(note, *summary.warnings(), *placement.notes)),
         greedy,
         replace(
-            deploy(survey.site, survey.models, survey.grid.rows(chosen), chosen),
+            survey.deploy(chosen),
             returns=summary,
             pedestrian_returns=_near_targets(survey.site.targets, users, grid, chosen),
         ),

@@ -164,11 +164,6 @@ class Objective:
         return Risk(TAILS[usual if self.risk == "auto" else self.risk], self.failures)
 
     @property
-    def weighted(self) -> bool:
-        """Whether this is the weighted problem."""
-        return self.central_weight is not None
-
-    @property
     def cheapest(self) -> bool:
         """Whether this is the reverse problem: the least price for a coverage."""
         return self.coverage is not None

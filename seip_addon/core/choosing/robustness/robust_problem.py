@@ -98,7 +98,7 @@ class RobustProblem:
                 for number in range(len(views))
             ]
             outcomes, seen = np.concatenate(each) / total, views.seen_by_any(rows)
-            shares = placement.covered / total, float(outcomes[0]), outcomes[1:]
+            shares = problem.value(placement.chosen) / total, float(outcomes[0]), outcomes[1:]
             evaluated.append(EvaluatedPlacement(name, placement, risk, *shares, seen, instants))
         return evaluated
 
