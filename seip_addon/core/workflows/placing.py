@@ -37,7 +37,7 @@ from ..errors import SeipError
 from ..progress import Progress
 from ..sensing.lidar.model import LidarModel
 from ..site.site import Site
-from .returns import crossing_returns, place_by_returns, returns_problem
+from .returns import crossing_returns, place_by_returns, survey_returns
 from .survey import Survey, surroundings
 from .traffic_runs import TrafficRuns
 
@@ -134,7 +134,7 @@ def _with_front(survey: Survey, solution: Solution) -> Generator[Progress, None,
         return solution
     problem = placement_problem(survey.site, survey.grid.visible, survey.models, objective)
     if summary is not None:
-        problem, _, _ = yield from returns_problem(survey, objective)
+        problem = (yield from survey_returns(survey, objective)).problem()
     # the bound of a solution holds for its own number of sensors unless a budget or a coverage limits it
     own = range(len(placement.chosen), (objective.count or 0) + 1)
     free = objective.budget is None and not objective.cheapest
