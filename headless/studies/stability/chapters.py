@@ -6,8 +6,7 @@ from collections.abc import Callable, Generator, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from headless.charts import pose_errors as pose_error_charts
-from headless.charts import traffic as traffic_charts
+from headless.charts import robustness as robustness_charts
 
 from seip_addon.core.choosing.placement.objective import DEFAULT_COUNT, Objective, placement_problem
 from seip_addon.core.choosing.placement.problem import PlacementProblem
@@ -163,9 +162,9 @@ def poses(scene: StudiedScene) -> Generator[Progress, None, Chapter]:
     study = yield from _robust(scene, TAIL_RISKS)
     deployment = survey.deploy(study[0].nominal.placement.chosen)
     under_errors = yield from pose_study(surroundings(survey), deployment, errors, 0, scene.scope.draws)
-    pose_error_charts.save_spread_chart(scene.charts / "spread.png", study, f"{scene.placed} under pose errors")
-    pose_error_charts.save_loss_chart(scene.charts / "blame.png", under_errors, f"{scene.placed}: what costs coverage")
-    pose_error_charts.save_frontier_chart(
+    robustness_charts.save_spread_chart(scene.charts / "spread.png", study, f"{scene.placed} under pose errors")
+    robustness_charts.save_loss_chart(scene.charts / "blame.png", under_errors, f"{scene.placed}: what costs coverage")
+    robustness_charts.save_frontier_chart(
         scene.charts / "frontier.png", study, f"{scene.placed}: what robustness costs and saves"
     )
     return Chapter(
@@ -182,7 +181,7 @@ def poses(scene: StudiedScene) -> Generator[Progress, None, Chapter]:
 def failures(scene: StudiedScene) -> Generator[Progress, None, Chapter]:
     """Study placements under sensor failures and multi-cover."""
     study = yield from _robust(scene, RISKS)
-    pose_error_charts.save_spread_chart(scene.charts / "failures.png", study, f"{scene.placed}: failures")
+    robustness_charts.save_spread_chart(scene.charts / "failures.png", study, f"{scene.placed}: failures")
     caption = "Distribution of remaining coverage over unseen draws: placements for failures and the nominal optimum"
     return Chapter(f"Failures: {scene.placed}", robust_rows(study), (Chart("failures.png", caption),))
 
@@ -202,10 +201,8 @@ def traffic(scene: StudiedScene) -> Generator[Progress, None, Chapter]:
     (study,) = yield from problem.compare(*placements)
     deployment = survey.deploy(study.robust.placement.chosen)
     title = f"{scene.placed} in traffic"
-    traffic_charts.save_time_map(
-        scene.charts / "time_seen.png", survey.geometry, survey.site, deployment, study.robust, title
-    )
-    traffic_charts.save_traffic_chart(scene.charts / "promise.png", study, scene.placed, title)
+    robustness_charts.save_time_map(scene.charts / "time_seen.png", survey, deployment, study.robust, title)
+    robustness_charts.save_traffic_chart(scene.charts / "promise.png", study, scene.placed, title)
     return Chapter(
         f"Occlusion by traffic: {scene.placed}",
         traffic_rows(study),
