@@ -132,8 +132,9 @@ def _with_front(survey: Survey, solution: Solution) -> Generator[Progress, None,
     objective, placement, summary = solution.objective, solution.placement, solution.deployment.returns
     if placement.status == MOVED or not len(placement.chosen) or objective.measure is not None:
         return solution
-    problem = placement_problem(survey.site, survey.grid.visible, survey.models, objective)
-    if summary is not None:
+    if summary is None:
+        problem = placement_problem(survey.site, survey.grid.visible, survey.models, objective)
+    else:
         problem = (yield from survey_returns(survey, objective)).problem()
     # the bound of a solution holds for its own number of sensors unless a budget or a coverage limits it
     own = range(len(placement.chosen), (objective.count or 0) + 1)

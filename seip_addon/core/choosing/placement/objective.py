@@ -223,7 +223,7 @@ class Solution:
     evaluation : Comparison, optional
         Comparison with the nominal optimum on held-out scenarios, where the placement was optimised over scenarios.
     front : tuple of FrontPoint
-        Best placements found with fewer and more sensors; see `price_front`. Empty if they were not searched for.
+        Best placements found with fewer and more sensors; see `front_of`. Empty if they were not searched for.
     crossings : tuple of CrossingReturns
         Expected returns from a pedestrian on each crossing, of all sensors together. Empty if not computed.
     """
