@@ -20,7 +20,7 @@ from ..placement.deployment import Deployment
 
 LOW_QUANTILE = 0.05  # quantile of coverage that is reported, and by which placements are compared
 
-NOTABLE_LOSS = 0.01  # share of the targets whose loss, in one of twenty draws, is worth a warning
+NOTABLE_LOSS = 0.01  # share of the targets whose loss is worth a warning: in one of twenty draws, or in traffic
 
 
 @dataclass(frozen=True, eq=False)
