@@ -41,6 +41,13 @@ from .returns import crossing_returns, place_by_returns, survey_returns
 from .survey import Survey, surroundings
 from .traffic_runs import TrafficRuns
 
+DRAWS_OF_KIND = 100
+"""Largest number of draws with one kind of pose error only."""
+
+ACCEPTED_MESSAGE = "accepted before the end of the search: running it to its end may find a better placement"
+
+_OVER_INSTANTS = {1.0: "on average over", 0.25: "in the worst quarter of", 0.0: "in the worst of"}
+
 
 def optimise(
     site: Site,
@@ -71,14 +78,6 @@ def optimise(
     return Solution(with_count(objective, site), placement, greedy, deployment)
 
 
-DRAWS_OF_KIND = 100
-"""Largest number of draws with one kind of pose error only."""
-
-ACCEPTED_MESSAGE = "accepted before the end of the search: running it to its end may find a better placement"
-
-_OVER_INSTANTS = {1.0: "on average over", 0.25: "in the worst quarter of", 0.0: "in the worst of"}
-
-
 def place(
     survey: Survey, objective: Objective, runs: TrafficRuns | None = None, acceptance: Acceptance | None = None
 ) -> Generator[Progress, None, Solution]:
@@ -98,12 +97,13 @@ def place(
     """
     measure = objective.measure
     limits = replace(survey.settings.limits, acceptance=acceptance)
-    if measure is None:
-        solution = yield from _nominal(survey, objective, limits)
-    else:
+    if measure is not None:
         solution = yield from _over_scenarios(survey, objective, limits, measure, runs)
-    around = surroundings(survey)
-    deployment = yield from with_gain_band(around, solution.deployment)
+    elif criterion_of(objective, survey.models) == "returns":
+        solution = yield from place_by_returns(survey, objective, limits)
+    else:
+        solution = yield from optimise(survey.site, survey.grid.visible, survey.models, objective, limits)
+    deployment = yield from with_gain_band(surroundings(survey), solution.deployment)
     notes = [*solution.placement.notes]
     if acceptance is not None and acceptance.accepted and solution.placement.status != "optimal":
         notes.append(ACCEPTED_MESSAGE)
@@ -150,13 +150,6 @@ def _with_front(survey: Survey, solution: Solution) -> Generator[Progress, None,
     returns = [ReturnsPoint(count, math.expm1(one.objective), one.price, one.gap) for count, one in found.items()]
     deployment = replace(solution.deployment, returns=replace(summary, front=tuple(returns)))
     return replace(solution, deployment=deployment)
-
-
-def _nominal(survey: Survey, objective: Objective, limits: SolverLimits) -> Generator[Progress, None, Solution]:
-    """Optimise for nominal poses on the empty road."""
-    if criterion_of(objective, survey.models) == "returns":
-        return (yield from place_by_returns(survey, objective, limits))
-    return (yield from optimise(survey.site, survey.grid.visible, survey.models, objective, limits))
 
 
 def _robust_problem(survey: Survey, objective: Objective, runs: TrafficRuns | None) -> RobustProblem:
