@@ -20,17 +20,12 @@ from tests.engines import ANY
 MODELS = load_catalogue()
 
 
-@pytest.fixture(scope="module")
-def placed():
-    site = junction_site(positions=16, sensors=("type1",), heights=(5.4,), spacing=3.0)
-    grid = finish(compute_visibility(site, MODELS, VisibilitySettings(delta=2.0), ANY))
-    return site, deploy(site, MODELS, grid.rows([0, 5]), [0, 5])
-
-
 @pytest.mark.slow
-def test_a_study_says_who_is_to_blame(placed):
-    site, deployment = placed
+def test_a_study_says_who_is_to_blame():
+    site = junction_site(positions=16, sensors=("type1",), heights=(5.4,), spacing=3.0)
     around = Surroundings(site, MODELS, VisibilitySettings(delta=2.0), engine=ANY)
+    grid = finish(compute_visibility(site, MODELS, around.sight, ANY))
+    deployment = deploy(site, MODELS, grid.rows([0, 5]), [0, 5])
     study = finish(pose_study(around, deployment, PoseErrors(tilt=math.radians(8)), seed=0, draws=(40, 10)))
     assert set(study.by_kind) == set(ERROR_KINDS)
     assert study.together.shape == (40,)
