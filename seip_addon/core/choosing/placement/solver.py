@@ -170,12 +170,11 @@ def placement_of(problem: PlacementProblem, incumbent: Incumbent, solver: str) -
     return assess(
         problem,
         instance.original[chosen],
+        incumbent.value * instance.unit,
         max(incumbent.bound, incumbent.value) * instance.unit,
         optimal=optimal,
         solver=solver,
-        seconds=incumbent.work.seconds,
-        notes=tuple(notes),
-        objective=incumbent.value * instance.unit,
+        notes=notes,
     )
 
 
