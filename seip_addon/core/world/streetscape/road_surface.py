@@ -87,8 +87,15 @@ class Roadside:
         return shapely.line_merge(edges) if edges.geom_type == "MultiLineString" else edges
 
 
-def roadside(surfaces: Sequence[LaneSurface]) -> Roadside:
+def roadside(surfaces: Sequence[LaneSurface], carriageway: BaseGeometry | None = None) -> Roadside:
     """Return the carriageway of lanes and its sides.
+
+    Parameters
+    ----------
+    surfaces : sequence of LaneSurface
+        Lanes in local axes.
+    carriageway : shapely geometry, optional
+        Area of the carriageway; by default that of the lanes.
 
     Examples
     --------
@@ -104,7 +111,7 @@ def roadside(surfaces: Sequence[LaneSurface]) -> Roadside:
     100
     """
     paved = in_groups(surfaces, CARRIAGEWAY)
-    carriageway = lane_outline(paved)
+    carriageway = lane_outline(paved) if carriageway is None else carriageway
     junctions = sorted({lane.junction_id for lane in paved if lane.junction_id is not None})
     inside = [lane_outline([lane for lane in paved if lane.junction_id == junction]) for junction in junctions]
     whole = shapely.union_all([carriageway, *map(_without_holes, inside)])
@@ -125,14 +132,9 @@ def bare_sides(roadside: Roadside, pavement: BaseGeometry) -> BaseGeometry:
     sides = roadside.sides()
     if pavement.is_empty or sides.is_empty:
         return sides
-    # For each short piece of a side take the rectangle next to it, away from the carriageway. The side is bare where no
-    # pavement meets it. A test point just left of the piece tells which way is out.
-    lines = [shapely.get_coordinates(line) for line in shapely.get_parts(shapely.segmentize(sides, SIDE_STEP))]
-    start, stop = (np.concatenate([line[cut] for line in lines]) for cut in (slice(-1), slice(1, None)))
-    along = (stop - start) / np.linalg.norm(stop - start, axis=1, keepdims=True)
-    aside = np.column_stack([-along[:, 1], along[:, 0]])
-    inner = shapely.contains_xy(roadside.filled, (start + stop) / 2 + 2 * MAX_SEAM * aside)
-    outwards = MAX_PAVEMENT_DISTANCE * np.where(inner[:, None], -aside, aside)
+    # For each short piece of a side take the rectangle next to it. The side is bare where no pavement meets it.
+    start, stop, outwards = side_pieces(roadside)
+    outwards = MAX_PAVEMENT_DISTANCE * outwards
     strips = shapely.polygons(np.stack([start, stop, stop + outwards, start + outwards], axis=1))
     shapely.prepare(pavement)
     is_bare = ~shapely.intersects(pavement, strips)
@@ -140,9 +142,21 @@ def bare_sides(roadside: Roadside, pavement: BaseGeometry) -> BaseGeometry:
     return shapely.union_all([line for line in shapely.get_parts(bare) if line.length >= MIN_SIDE_LENGTH])
 
 
-def without_small_holes(area: BaseGeometry) -> BaseGeometry:
-    """Return an area of lanes without the small holes that these leave between them in junctions."""
-    return _without_holes(area, least=MAX_HOLE)
+def side_pieces(roadside: Roadside) -> tuple[Float, Float, Float]:
+    """Return starts and ends of short pieces of the sides, and the directions away from the road, (n, 2) each."""
+    pieces = shapely.get_parts(shapely.segmentize(roadside.sides(), SIDE_STEP))
+    lines = [np.empty((0, 2)), *(shapely.get_coordinates(line) for line in pieces)]
+    start, stop = (np.concatenate([line[cut] for line in lines]) for cut in (slice(-1), slice(1, None)))
+    along = (stop - start) / np.linalg.norm(stop - start, axis=1, keepdims=True)
+    aside = np.column_stack([-along[:, 1], along[:, 0]])
+    # A test point just left of the piece tells which way is out.
+    inner = shapely.contains_xy(roadside.filled, (start + stop) / 2 + 2 * MAX_SEAM * aside)
+    return start, stop, np.where(inner[:, None], -aside, aside)
+
+
+def without_small_holes(area: BaseGeometry, least: float = MAX_HOLE) -> BaseGeometry:
+    """Return an area of lanes without the small holes, in m², that these leave between them in junctions."""
+    return _without_holes(area, least=least)
 
 
 def without_gaps(roadside: Roadside, surfaces: Sequence[LaneSurface], *, fill: bool) -> BaseGeometry:

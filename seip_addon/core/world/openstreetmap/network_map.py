@@ -1,0 +1,344 @@
+"""Streets of a network that SUMO's netconvert made of an extract: lanes, junctions, crossings and signals.
+
+A network has lanes as centre lines with a width, and junctions, their pavements and crossings as areas. It is read with
+the package's own XML reader: the module sumolib is not part of every installation of SUMO.
+"""
+
+import itertools
+import math
+from collections import defaultdict
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+import shapely
+from shapely.geometry.base import BaseGeometry
+
+from ...arrays import Float
+from ...errors import SeipError
+from ...geometry.plan import united, without
+from ...progress import finish
+from ...storage.xml_stream import Attributes, read_tags
+from ..opendrive.lanes import LaneSurface
+from ..opendrive.objects import PlacedObject
+from ..opendrive.profile import ZERO_PROFILE, LateralShape, Profile
+from ..opendrive.reference_line import Clothoid, ReferenceLine
+from ..opendrive.road_map import Junction, Road, RoadLink, RoadMap
+from ..opendrive.signals import PlacedSignal
+from ..streetscape.named_places import CROSSING
+from ..streetscape.street_map import JunctionArea, StreetMap
+
+LANE_WIDTH = 3.2  # metres: SUMO's width of lanes without one
+CROSSING_WIDTH = 4.0  # metres: the same of crossings
+MIN_STEP = 1e-3  # metres between points of a line: closer ones are one point
+MAX_MITRE = 2.0  # length of a corner's offset in widths, at most
+LAMP_HEIGHT = 5.0  # metres above the road
+RAILS = {"tram", "rail_urban", "rail", "rail_electric", "rail_fast"}
+ROAD_VEHICLES = {"passenger", "bus", "delivery", "truck", "taxi", "private", "motorcycle"}
+
+
+@dataclass(eq=False)
+class _Lane:
+    """A lane: its type as in OpenDRIVE, "" without a surface, its width in metres, and its line (n, 3)."""
+
+    type: str
+    width: float
+    line: Float
+
+
+@dataclass(eq=False)
+class _Edge:
+    """An edge of the network, with its lanes by their number from the kerb."""
+
+    id: str
+    function: str
+    begin: str
+    end: str
+    name: str
+    lanes: dict[int, _Lane] = field(default_factory=dict)
+
+
+class _Reader:
+    """Handler of a stream of XML that collects the elements of a network."""
+
+    def __init__(self) -> None:
+        self.left_hand = False
+        self.location: Attributes = {}
+        self.edges: dict[str, _Edge] = {}
+        self.shapes: dict[str, Float] = {}
+        self.connections: list[Attributes] = []
+        self._current = ""
+
+    def read_element(self, tag: str, given: Attributes) -> None:
+        """Read an element."""
+        if tag == "net":
+            self.left_hand = given.get("lefthand") == "true"
+        elif tag == "location":
+            self.location = given
+        elif tag == "edge":
+            self._current = given["id"]
+            own = (given.get(key, "") for key in ("function", "from", "to", "name"))
+            self.edges[self._current] = _Edge(self._current, *own)
+        elif tag == "lane":
+            default = CROSSING_WIDTH if self.edges[self._current].function == "crossing" else LANE_WIDTH
+            lane = _Lane(_type(given), float(given.get("width", default)), _points(given["shape"]))
+            self.edges[self._current].lanes[int(given["index"])] = lane
+        elif tag == "junction" and given.get("type") != "internal" and given.get("shape"):
+            self.shapes[given["id"]] = _points(given["shape"])
+        elif tag == "connection":
+            self.connections.append(given)
+
+
+def read_streets(path: Path) -> StreetMap:
+    """Read the streets of a network.
+
+    Each edge is a road, and so is each group of parallel connections within a junction. Lane ids, edges and links are
+    those that OpenDRIVE would have: lanes count from the middle of the street outwards, negative if traffic keeps to
+    the right.
+
+    Parameters
+    ----------
+    path : Path
+        Network (.net.xml) with internal lanes.
+
+    Raises
+    ------
+    SeipError
+        The file cannot be read or is not a network.
+    """
+    reader = _Reader()
+    try:
+        finish(read_tags(path, reader.read_element))
+        joints = frozenset(_joints(reader))
+        roads = list(_roads(reader))
+    except (KeyError, ValueError) as error:
+        raise SeipError(f"{path.name} is not a valid SUMO network ({error}); write it again with netconvert") from error
+    if not roads:
+        raise SeipError(f"{path.name} has no streets")
+    offset = np.array(reader.location["netOffset"].split(","), dtype=np.float64)
+    road_map = RoadMap(
+        name="",
+        header_offset=np.array([*-offset, 0.0, 0.0]),
+        geo_reference=reader.location["projParameter"],
+        roads=tuple(road for road, _ in roads),
+        junctions=tuple(Junction(number, number) for number in reader.shapes),
+    )
+    lanes = tuple(itertools.chain.from_iterable(lanes for _, lanes in roads))
+    areas = tuple(_junction_areas(reader, lanes, joints))
+    return StreetMap(road_map, lanes, tuple(_crossings(reader)), tuple(_signals(reader)), areas)
+
+
+def _points(shape: str) -> Float:
+    """Return the points (n, 3) of a shape, without repeated ones."""
+    rows = [[float(value) for value in point.split(",")] for point in shape.split()]
+    points = np.array([(*row, 0.0)[:3] for row in rows])
+    steps = np.hypot(*np.diff(points[:, :2], axis=0).T)
+    return points[np.concatenate([[True], steps > MIN_STEP])]
+
+
+def _type(given: Attributes) -> str:
+    """Return the lane type of OpenDRIVE that a lane with some permissions has, "" if it has no surface."""
+    allowed, closed = (set(given.get(key, "").split()) for key in ("allow", "disallow"))
+    if allowed == {"pedestrian"}:
+        return "sidewalk"
+    if allowed == {"bicycle"}:
+        return "biking"
+    if allowed and "all" not in allowed:
+        if allowed & ROAD_VEHICLES:
+            return "driving"
+        return "tram" if allowed & RAILS else ""
+    return "" if "all" in closed else "driving"
+
+
+def _joints(reader: _Reader) -> Iterator[str]:
+    """Yield the junctions where no more than two streets meet, so that one only continues."""
+    meeting: defaultdict[str, set[str]] = defaultdict(set)
+    for edge in reader.edges.values():
+        if not edge.function and any(lane.type not in ("", "sidewalk") for lane in edge.lanes.values()):
+            meeting[edge.begin].add(edge.end)
+            meeting[edge.end].add(edge.begin)
+    return (node for node in reader.shapes if len(meeting[node]) < 3)
+
+
+def _roads(reader: _Reader) -> Iterator[tuple[Road, list[LaneSurface]]]:
+    """Yield the roads outside and within junctions, with their lanes."""
+    for edge in reader.edges.values():
+        if not edge.function:
+            links = tuple(RoadLink("junction", node) for node in (edge.begin, edge.end))
+            lanes = {number: lane for number, lane in edge.lanes.items() if lane.type and len(lane.line) > 1}
+            if lanes:
+                yield _road(edge.id, edge.name, None, lanes, links, left_hand=reader.left_hand)
+    joints = frozenset(_joints(reader))
+    for (number, before, after), lanes in _connecting(reader).items():
+        junction = reader.edges[before].end
+        links = (RoadLink("road", before, "end"), RoadLink("road", after, "start"))
+        road, surfaces = _road(number, "", junction, lanes, links, left_hand=reader.left_hand)
+        # Where a street only continues, its lanes are those of the street.
+        yield road, [replace(one, junction_id=None) for one in surfaces] if junction in joints else surfaces
+
+
+def _connecting(reader: _Reader) -> dict[tuple[str, str, str], dict[int, _Lane]]:
+    """Return the lanes within junctions by road: the first internal edge, and the edges before and after it."""
+    # A turn on which vehicles wait inside the junction has several internal lanes in a row.
+    onward = {f"{one['from']}_{one['fromLane']}": one for one in reader.connections if one["from"].startswith(":")}
+    found: dict[tuple[str, str, str], dict[int, _Lane]] = {}
+    for one in reader.connections:
+        via = one.get("via")
+        if one["from"].startswith(":") or via is None:
+            continue
+        first, _, index = via.rpartition("_")
+        if reader.edges[first].function != "internal":
+            continue
+        parts = []
+        while via is not None:
+            edge, _, number = via.rpartition("_")
+            parts.append(reader.edges[edge].lanes[int(number)].line)
+            via = onward[via].get("via") if via in onward else None
+        line = np.concatenate(parts)
+        line = line[np.concatenate([[True], np.hypot(*np.diff(line[:, :2], axis=0).T) > MIN_STEP])]
+        source = reader.edges[one["from"]].lanes[int(one["fromLane"])]
+        target = reader.edges[one["to"]].lanes[int(one["toLane"])]
+        if len(line) > 1 and source.type and target.type:
+            # A cycle lane that leads into a driving lane ends where the junction begins.
+            kind = source.type if source.type == target.type else "driving"
+            lanes = found.setdefault((first, one["from"], one["to"]), {})
+            lanes[int(index)] = _Lane(kind, min(source.width, target.width), line)
+    return found
+
+
+def _road(
+    number: str,
+    name: str,
+    junction: str | None,
+    lanes: Mapping[int, _Lane],
+    links: Sequence[RoadLink],
+    *,
+    left_hand: bool,
+) -> tuple[Road, list[LaneSurface]]:
+    """Return a road and its lanes; its reference line is the inner edge of the innermost lane."""
+    order = sorted(lanes, reverse=True)  # from the middle of the street outwards
+    # All lanes get the same rows: at the same share of their length, so that neighbours keep a common edge.
+    shares = [_shares(lanes[one].line) for one in order]
+    rows = np.unique(np.round(np.concatenate(shares), 9))
+    edges = [
+        _edges(np.column_stack([np.interp(rows, share, lanes[one].line[:, axis]) for axis in range(3)]), lanes[one].width)
+        for one, share in zip(order, shares, strict=True)
+    ]
+    reference = edges[0][1 if left_hand else 0]
+    steps = np.hypot(*np.diff(reference[:, :2], axis=0).T)
+    s = np.concatenate([[0.0], np.cumsum(np.maximum(steps, MIN_STEP))])
+    away = 1 if left_hand else -1
+    surfaces = [
+        LaneSurface(number, junction, 0, away * place, lanes[one].type, left_hand, s, left, right)
+        for place, (one, (left, right)) in enumerate(zip(order, edges, strict=True), start=1)
+    ]
+    heading = np.arctan2(*np.diff(reference[:, :2], axis=0).T[::-1])
+    line = ReferenceLine(
+        s[:-1], np.diff(s), np.column_stack([reference[:-1, :2], heading]), (Clothoid(0.0, 0.0),) * (len(s) - 1)
+    )
+    slopes = np.diff(reference[:, 2]) / np.diff(s)
+    elevation = Profile(s[:-1], np.column_stack([reference[:-1, 2], slopes, np.zeros((len(slopes), 2))]))
+    road = Road(
+        id=number,
+        name=name,
+        junction_id=junction,
+        keeps_left=left_hand,
+        reference_line=line,
+        elevation=elevation,
+        superelevation=ZERO_PROFILE,
+        left_crossfall=ZERO_PROFILE,
+        right_crossfall=ZERO_PROFILE,
+        shape=LateralShape(np.empty(0), ()),
+        lane_offset=ZERO_PROFILE,
+        sections=(),
+        objects=(),
+        signals=(),
+        predecessor=links[0],
+        successor=links[1],
+    )
+    return road, [surface for surface in surfaces if len(surface.triangles)]
+
+
+def _shares(line: Float) -> Float:
+    """Return how far along a line (n, 3) each point is, (n,) from 0 to 1."""
+    travelled = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line[:, :2], axis=0).T))])
+    return np.asarray(travelled / travelled[-1])
+
+
+def _edges(line: Float, width: float) -> tuple[Float, Float]:
+    """Return the left and right edge (n, 3) of a lane along its centre line (n, 3), with mitred corners."""
+    steps = np.diff(line[:, :2], axis=0)
+    units = steps / np.maximum(np.hypot(*steps.T), 1e-9)[:, None]
+    before, after = np.concatenate([units[:1], units]), np.concatenate([units, units[-1:]])
+    # The normals of both pieces at a corner, (a + b) / (1 + a·b), have the offset of both edges: the mitre.
+    cosine = (before * after).sum(axis=1, keepdims=True)
+    along = (before + after) / np.maximum(1.0 + cosine, 2.0 / MAX_MITRE**2)
+    aside = np.column_stack([-along[:, 1], along[:, 0], np.zeros(len(line))]) * width / 2
+    return line + aside, line - aside
+
+
+def _junction_areas(
+    reader: _Reader, lanes: Sequence[LaneSurface], joints: frozenset[str]
+) -> Iterator[JunctionArea]:
+    """Yield the areas of the junctions."""
+    walking: defaultdict[str, list[BaseGeometry]] = defaultdict(list)
+    for edge in reader.edges.values():
+        if edge.function == "walkingarea":
+            node = edge.id[1:].rpartition("_w")[0]
+            walking[node] += [_polygon(lane.line) for lane in edge.lanes.values()]
+    roads: defaultdict[str, set[str]] = defaultdict(set)
+    for lane in lanes:
+        if lane.junction_id is not None:
+            roads[lane.junction_id].add(lane.road_id)
+    for edge in reader.edges.values():
+        if not edge.function:
+            roads[edge.begin].add(edge.id)
+            roads[edge.end].add(edge.id)
+    driven: defaultdict[str, list[BaseGeometry]] = defaultdict(list)
+    for lane in lanes:
+        if lane.junction_id is not None and lane.lane_type == "driving":
+            driven[lane.junction_id].append(lane.polygon)
+    for node, shape in reader.shapes.items():
+        walked = united(walking[node])
+        # Edges shorter than the junction have pavements that reach into it: where vehicles drive there is none.
+        area = united([without(_polygon(shape), walked), *driven[node]])
+        yield JunctionArea(node, area, walked, frozenset(roads[node]), node in joints)
+
+
+def _polygon(line: Float) -> BaseGeometry:
+    return shapely.make_valid(shapely.Polygon(line[:, :2])) if len(line) > 2 else shapely.Polygon()
+
+
+def _crossings(reader: _Reader) -> Iterator[PlacedObject]:
+    """Yield the crossings that netconvert guesses, as areas across the street."""
+    for edge in reader.edges.values():
+        if edge.function == "crossing":
+            for lane in edge.lanes.values():
+                yield crossing(edge.id, "", lane.line[:, :2], lane.width)
+
+
+def crossing(number: str, name: str, line: Float, depth: float) -> PlacedObject:
+    """Return a crossing along a line (n, 2) from kerb to kerb, ``depth`` metres wide."""
+    first, last = line[0], line[-1]
+    x, y = last - first
+    position = np.array([*(first + last) / 2, 0.0])
+    width = float(math.hypot(x, y))
+    heading = math.atan2(y, x) - math.pi / 2
+    return PlacedObject("", number, name, CROSSING, position, heading, 0.0, 0.0, depth, width, 0.0, 0.0, ())
+
+
+def _signals(reader: _Reader) -> Iterator[PlacedSignal]:
+    """Yield the traffic lights: one at the end of each lane that leads into a junction with signals."""
+    seen = set()
+    for one in reader.connections:
+        lane = (one["from"], one.get("fromLane", ""))
+        edge = reader.edges.get(one["from"])
+        if "tl" in one and lane not in seen and edge is not None and not edge.function:
+            seen.add(lane)
+            own = edge.lanes[int(lane[1])]
+            if own.type in ("driving", "tram") and len(own.line) > 1:
+                x, y = (own.line[-1] - own.line[-2])[:2]
+                position = own.line[-1] + [0.0, 0.0, LAMP_HEIGHT]
+                number = f"{one['tl']}_{one['linkIndex']}"
+                yield PlacedSignal(edge.id, number, "", "1000011", True, position, math.atan2(y, x))
