@@ -26,10 +26,10 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from ...arrays import Boolean, Float, Integer
-from ..elevation.raised_map import Profiles
 from ..opendrive.lanes import LaneSurface
 from ..opendrive.road_map import Road, RoadLink, RoadMap
 from ..streetscape.road_surface import CARRIAGEWAY, in_groups
+from ..streetscape.street_map import Profiles
 from .bridges import Crossing, Structures, corridors
 from .extract import Tags, Way
 from .plan_shapes import PlanShapes

@@ -6,8 +6,9 @@ the package's own XML reader: the module sumolib is not part of every installati
 
 import itertools
 import math
+import re
 from collections import defaultdict
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -27,8 +28,9 @@ from ..opendrive.reference_line import Clothoid, ReferenceLine
 from ..opendrive.road_map import Junction, Road, RoadLink, RoadMap
 from ..opendrive.signals import PlacedSignal
 from ..streetscape.named_places import CROSSING
-from ..streetscape.street_map import JunctionArea, StreetMap
+from ..streetscape.street_map import JunctionArea, Profiles, StreetMap
 
+_LANE = re.compile(r'(<lane id=")([^"]*)("[^>]*? shape=")([^"]*)"')
 LANE_WIDTH = 3.2  # metres: SUMO's width of lanes without one
 CROSSING_WIDTH = 4.0  # metres: the same of crossings
 MIN_STEP = 1e-3  # metres between points of a line: closer ones are one point
@@ -90,8 +92,50 @@ class _Reader:
             self.connections.append(given)
 
 
-def read_streets(path: Path) -> StreetMap:
-    """Read the streets of a network.
+@dataclass(frozen=True, eq=False)
+class Network:
+    """A network of SUMO: its streets, and the file that traffic is simulated on.
+
+    Parameters
+    ----------
+    streets : StreetMap
+        Streets of the network.
+    text : str
+        Content of the file.
+    pieces : mapping of str to (str, float, float)
+        Road of each lane in the file by the id of the lane, and the shares of the road where it begins and ends.
+    """
+
+    streets: StreetMap
+    text: str
+    pieces: Mapping[str, tuple[str, float, float]]
+
+    def raised_text(self, profiles: Profiles) -> str:
+        """Return the file with new heights of the roads."""
+
+        def raised(match: re.Match[str]) -> str:
+            number, low, high = self.pieces.get(match[2], ("", 0.0, 1.0))
+            if number not in profiles:
+                return match[0]
+            line = _points(match[4])
+            along, heights = profiles[number]
+            at = (low + (high - low) * _shares(line)) * along[-1] if len(line) > 1 else np.array([low * along[-1]])
+            rows = zip(line[:, :2].tolist(), np.interp(at, along, heights).tolist(), strict=True)
+            shape = " ".join(f"{x:.3f},{y:.3f},{z:.3f}" for (x, y), z in rows)
+            return f'{match[1]}{match[2]}{match[3]}{shape}"'
+
+        return _LANE.sub(raised, self.text)
+
+
+def credited(text: str, credits: Iterable[str]) -> str:
+    """Return the text of a network with credits to the sources of its data."""
+    lines = "".join(f"<!-- {one.replace('--', '-')} -->\n" for one in credits)
+    head, mark, rest = text.partition("<net ")
+    return f"{head}{lines}{mark}{rest}"
+
+
+def read_network(path: Path) -> Network:
+    """Read a network of SUMO.
 
     Each edge is a road, and so is each group of parallel connections within a junction. Lane ids, edges and links are
     those that OpenDRIVE would have: lanes count from the middle of the street outwards, negative if traffic keeps to
@@ -111,7 +155,8 @@ def read_streets(path: Path) -> StreetMap:
     try:
         finish(read_tags(path, reader.read_element))
         joints = frozenset(_joints(reader))
-        roads = list(_roads(reader))
+        pieces = {f"{edge.id}_{index}": (edge.id, 0.0, 1.0) for edge in reader.edges.values() for index in edge.lanes}
+        roads = list(_roads(reader, pieces))
     except (KeyError, ValueError) as error:
         raise SeipError(f"{path.name} is not a valid SUMO network ({error}); write it again with netconvert") from error
     if not roads:
@@ -126,7 +171,8 @@ def read_streets(path: Path) -> StreetMap:
     )
     lanes = tuple(itertools.chain.from_iterable(lanes for _, lanes in roads))
     areas = tuple(_junction_areas(reader, lanes, joints))
-    return StreetMap(road_map, lanes, tuple(_crossings(reader)), tuple(_signals(reader)), areas)
+    streets = StreetMap(road_map, lanes, tuple(_crossings(reader)), tuple(_signals(reader)), areas)
+    return Network(streets, path.read_text(encoding="utf-8"), pieces)
 
 
 def _points(shape: str) -> Float:
@@ -161,8 +207,10 @@ def _joints(reader: _Reader) -> Iterator[str]:
     return (node for node in reader.shapes if len(meeting[node]) < 3)
 
 
-def _roads(reader: _Reader) -> Iterator[tuple[Road, list[LaneSurface]]]:
-    """Yield the roads outside and within junctions, with their lanes."""
+def _roads(
+    reader: _Reader, pieces: dict[str, tuple[str, float, float]]
+) -> Iterator[tuple[Road, list[LaneSurface]]]:
+    """Yield the roads outside and within junctions, with their lanes; add the roads of internal lanes to ``pieces``."""
     for edge in reader.edges.values():
         if not edge.function:
             links = tuple(RoadLink("junction", node) for node in (edge.begin, edge.end))
@@ -170,7 +218,7 @@ def _roads(reader: _Reader) -> Iterator[tuple[Road, list[LaneSurface]]]:
             if lanes:
                 yield _road(edge.id, edge.name, None, lanes, links, left_hand=reader.left_hand)
     joints = frozenset(_joints(reader))
-    for (number, before, after), lanes in _connecting(reader).items():
+    for (number, before, after), lanes in _connecting(reader, pieces).items():
         junction = reader.edges[before].end
         links = (RoadLink("road", before, "end"), RoadLink("road", after, "start"))
         road, surfaces = _road(number, "", junction, lanes, links, left_hand=reader.left_hand)
@@ -178,7 +226,9 @@ def _roads(reader: _Reader) -> Iterator[tuple[Road, list[LaneSurface]]]:
         yield road, [replace(one, junction_id=None) for one in surfaces] if junction in joints else surfaces
 
 
-def _connecting(reader: _Reader) -> dict[tuple[str, str, str], dict[int, _Lane]]:
+def _connecting(
+    reader: _Reader, pieces: dict[str, tuple[str, float, float]]
+) -> dict[tuple[str, str, str], dict[int, _Lane]]:
     """Return the lanes within junctions by road: the first internal edge, and the edges before and after it."""
     # A turn on which vehicles wait inside the junction has several internal lanes in a row.
     onward = {f"{one['from']}_{one['fromLane']}": one for one in reader.connections if one["from"].startswith(":")}
@@ -190,11 +240,14 @@ def _connecting(reader: _Reader) -> dict[tuple[str, str, str], dict[int, _Lane]]
         first, _, index = via.rpartition("_")
         if reader.edges[first].function != "internal":
             continue
-        parts = []
+        chain = []
         while via is not None:
-            edge, _, number = via.rpartition("_")
-            parts.append(reader.edges[edge].lanes[int(number)].line)
+            chain.append(via)
             via = onward[via].get("via") if via in onward else None
+        parts = [reader.edges[edge].lanes[int(number)].line for edge, _, number in (one.rpartition("_") for one in chain)]
+        ends = np.concatenate([[0.0], np.cumsum([max(_length(part), MIN_STEP) for part in parts])])
+        ends /= ends[-1]
+        pieces |= {one: (first, *span) for one, span in zip(chain, itertools.pairwise(ends.tolist()), strict=True)}
         line = np.concatenate(parts)
         line = line[np.concatenate([[True], np.hypot(*np.diff(line[:, :2], axis=0).T) > MIN_STEP])]
         source = reader.edges[one["from"]].lanes[int(one["fromLane"])]
@@ -260,6 +313,10 @@ def _road(
     return road, [surface for surface in surfaces if len(surface.triangles)]
 
 
+def _length(line: Float) -> float:
+    return float(np.hypot(*np.diff(line[:, :2], axis=0).T).sum())
+
+
 def _shares(line: Float) -> Float:
     """Return how far along a line (n, 3) each point is, (n,) from 0 to 1."""
     travelled = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line[:, :2], axis=0).T))])
@@ -307,7 +364,9 @@ def _junction_areas(
 
 
 def _polygon(line: Float) -> BaseGeometry:
-    return shapely.make_valid(shapely.Polygon(line[:, :2])) if len(line) > 2 else shapely.Polygon()
+    """Return the area within a line (n, 3); where that crosses itself, all parts of it."""
+    parts = shapely.get_parts(shapely.make_valid(shapely.Polygon(line[:, :2]))) if len(line) > 2 else []
+    return shapely.union_all([part for part in parts if shapely.get_dimensions(part) == 2])
 
 
 def _crossings(reader: _Reader) -> Iterator[PlacedObject]:

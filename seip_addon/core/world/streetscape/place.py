@@ -10,7 +10,7 @@ from shapely.geometry.base import BaseGeometry
 
 from ...arrays import Float
 from ...errors import SeipError
-from ...geometry.plan import closed
+from ...geometry.plan import closed, united
 from ...site.scene_geometry import DEFAULT_WEIGHT
 from ..opendrive.junctions import find_junction, junction_area, nearest_junctions
 from ..opendrive.lanes import LaneSurface
@@ -19,9 +19,19 @@ from . import road_surface
 from .approaches import approach_lanes
 from .description import DEFAULT_RADIUS, MAX_RADIUS, SiteDescription
 from .geographic_position import looks_like_degrees
-from .intersections import JUNCTION_REACH, box_along, filled, intersection, ring_roads, with_other_carriageways
+from .intersections import (
+    JUNCTION_REACH,
+    box_along,
+    intersection,
+    leads_between,
+    ring_roads,
+    with_other_carriageways,
+)
 from .levels import Levels, split_levels
 from .named_places import street_names
+from .street_areas import GAP as JUNCTION_GAP
+from .street_areas import MIN_ISLAND_AREA
+from .street_map import JunctionArea
 
 MIN_SHARE_OF_JUNCTION = 0.5  # share of a junction's area in a region from which on the region includes all of it
 SCENE_MARGIN = 40.0  # metres that the scene extends beyond the region of interest, for occluders at its edge
@@ -40,11 +50,14 @@ class Place:
         Lanes of the map to consider, map coordinates.
     description : SiteDescription
         Choice of the place and its region.
+    junctions : tuple of JunctionArea
+        Areas of the junctions of a network.
     """
 
     road_map: RoadMap
     surfaces: Sequence[LaneSurface]
     description: SiteDescription
+    junctions: tuple[JunctionArea, ...] = ()
 
     @cached_property
     def centre(self) -> Float:
@@ -122,16 +135,21 @@ class Place:
         raise self._no_driving_lane()
 
     def _whole_streets(self, lanes: Sequence[LaneSurface], shift: Float) -> BaseGeometry:
-        """Return the area of lanes (local axes) with the opposite carriageways of their streets and whole junctions."""
+        """Return the area of lanes (local axes) with the opposite carriageways of their streets and whole junctions.
+
+        Links that begin and end there, such as lanes for turning right, and other carriageways of one street, too.
+        """
         around = self.within.convex_hull.buffer(SCENE_MARGIN)
         driving = road_surface.in_groups(self.surfaces, ["driving"])
         nearby = road_surface.local_strips(driving, shift, shifted(around, -shift))
         area = with_other_carriageways(lanes, nearby, self._names)
-        numbers = sorted({lane.junction_id for lane in nearby if lane.junction_id is not None})
-        junctions = [filled([lane for lane in nearby if lane.junction_id == number]) for number in numbers]
+        there = {lane.road_id for lane in nearby}
+        junctions = [shifted(one.carriageway, -shift) for one in self.junctions if there & one.roads]
         inside = [one for one in junctions if one.intersection(area).area > MIN_SHARE_OF_JUNCTION * one.area]
-        whole = closed(shapely.union_all([area, *inside]), road_surface.MAX_SEAM)
-        return road_surface.without_crumbs(whole, least=road_surface.MIN_ISLAND_AREA)
+        whole = closed(united([area, *inside]), JUNCTION_GAP)
+        links = [own for own in road_surface.by_road(nearby).values() if all(leads_between(lane, whole) for lane in own)]
+        whole = united([whole, *(lane.polygon for own in links for lane in own)])
+        return road_surface.without_crumbs(closed(whole, JUNCTION_GAP), least=MIN_ISLAND_AREA)
 
     def weighted_areas(self) -> list[tuple[str, BaseGeometry, float]]:
         """Return name, area and weight of the weighted regions.

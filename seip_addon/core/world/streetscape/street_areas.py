@@ -17,10 +17,7 @@ from ..opendrive.lanes import LaneSurface
 from ..opendrive.road_map import Road
 from .road_surface import (
     CARRIAGEWAY,
-    MIN_ISLAND_AREA,
-    MIN_PAVEMENT_WIDTH,
     Roadside,
-    SMALL_NOTCH,
     by_road,
     in_groups,
     inner_edge,
@@ -37,6 +34,9 @@ MIN_ROAD_AREA = 5.0  # m²: smaller parts of a carriageway are crumbs
 MAX_REFUGE = 60.0  # m²: smaller holes of a carriageway at junctions are where its lanes leave gaps
 GAP = 0.5  # metres: gaps up to twice this between lanes and junctions are closed
 AROUND_JUNCTION = 3.0  # metres from a junction within which such gaps lie
+MIN_ISLAND_AREA = 15.0  # m²: smaller holes of the carriageway are not islands
+SMALL_NOTCH = 1.25  # metres: notches of a pavement up to twice this are closed
+MIN_PAVEMENT_WIDTH = 0.6  # metres: narrower parts of pavements are left out
 PAVEMENT_WIDTH = 2.5  # metres of pavement along the carriageway of a junction
 RATE = 10.0  # metres along the road for each metre that it widens where a lane is added
 MIN_JUMP, MAX_JUMP = 0.5, 8.0  # metres: smaller jumps of an edge need no taper, larger ones are not added lanes
