@@ -18,7 +18,7 @@ from shapely.geometry.base import BaseGeometry
 
 from ...arrays import Float
 from ...errors import SeipError
-from ...geometry.plan import united, without
+from ...geometry.plan import closed, united, without
 from ...progress import finish
 from ...storage.xml_stream import Attributes, read_tags
 from ..opendrive.lanes import LaneSurface
@@ -27,12 +27,18 @@ from ..opendrive.profile import ZERO_PROFILE, LateralShape, Profile
 from ..opendrive.reference_line import Clothoid, ReferenceLine
 from ..opendrive.road_map import Junction, Road, RoadLink, RoadMap
 from ..opendrive.signals import PlacedSignal
+from ..streetscape.intersections import SAME_DIRECTION
 from ..streetscape.named_places import CROSSING
 from ..streetscape.street_map import JunctionArea, Profiles, StreetMap
 
 _LANE = re.compile(r'(<lane id=")([^"]*)("[^>]*? shape=")([^"]*)"')
+MIN_ARMS = 3  # arms of a junction; where fewer meet, a street continues
+ARM_GAP = 2.0  # metres between two ends of carriageways of one arm at most
+MAX_MERGING = 4  # ends of edges where the directions of one street divide: two of each direction
 LANE_WIDTH = 3.2  # metres: SUMO's width of lanes without one
 CROSSING_WIDTH = 4.0  # metres: the same of crossings
+CORNER = 2.0  # metres that the carriageway of a junction extends beyond the lanes through it, at most
+BIKE_LANE = 0.75  # half the width of a cycle lane, metres: between lanes through a junction
 MIN_STEP = 1e-3  # metres between points of a line: closer ones are one point
 MAX_MITRE = 2.0  # length of a corner's offset in widths, at most
 LAMP_HEIGHT = 5.0  # metres above the road
@@ -198,13 +204,37 @@ def _type(given: Attributes) -> str:
 
 
 def _joints(reader: _Reader) -> Iterator[str]:
-    """Yield the junctions where no more than two streets meet, so that one only continues."""
-    meeting: defaultdict[str, set[str]] = defaultdict(set)
+    """Yield the junctions where no more than two arms meet, so that a street only continues.
+
+    Carriageways of both directions are one arm if they leave in one direction next to each other, as where a median
+    begins.
+    """
+    neighbours: defaultdict[str, set[str]] = defaultdict(set)
+    ends: defaultdict[str, list[tuple[shapely.LineString, float]]] = defaultdict(list)
     for edge in reader.edges.values():
-        if not edge.function and any(lane.type not in ("", "sidewalk") for lane in edge.lanes.values()):
-            meeting[edge.begin].add(edge.end)
-            meeting[edge.end].add(edge.begin)
-    return (node for node in reader.shapes if len(meeting[node]) < 3)
+        driven = [lane for lane in edge.lanes.values() if lane.type not in ("", "sidewalk") and len(lane.line) > 1]
+        if edge.function or not driven:
+            continue
+        neighbours[edge.begin].add(edge.end)
+        neighbours[edge.end].add(edge.begin)
+        for node, row, onward in ((edge.begin, 0, 1), (edge.end, -1, -2)):
+            outer, inner = driven[0].line, driven[-1].line
+            x, y = (inner[onward] - inner[row])[:2]
+            ends[node].append((shapely.LineString([outer[row, :2], inner[row, :2]]), math.atan2(y, x)))
+    for node in reader.shapes:
+        across = shapely.union_all([line.buffer((LANE_WIDTH + ARM_GAP) / 2) for line, _ in ends[node]])
+        arms = max(len(shapely.get_parts(across)), _directions([heading for _, heading in ends[node]]))
+        if len(neighbours[node]) < MIN_ARMS or (arms < MIN_ARMS and len(ends[node]) <= MAX_MERGING):
+            yield node
+
+
+def _directions(headings: Sequence[float]) -> int:
+    """Return the number of headings that differ by more than `SAME_DIRECTION` from each other."""
+    found: list[float] = []
+    for heading in headings:
+        if all(abs(math.remainder(heading - other, math.tau)) > SAME_DIRECTION for other in found):
+            found.append(heading)
+    return len(found)
 
 
 def _roads(
@@ -357,9 +387,14 @@ def _junction_areas(
         if lane.junction_id is not None and lane.lane_type == "driving":
             driven[lane.junction_id].append(lane.polygon)
     for node, shape in reader.shapes.items():
-        walked = united(walking[node])
-        # Edges shorter than the junction have pavements that reach into it: where vehicles drive there is none.
-        area = united([without(_polygon(shape), walked), *driven[node]])
+        whole, lanes_there = _polygon(shape), united(driven[node])
+        area = without(whole, united(walking[node]))
+        if not lanes_there.is_empty:
+            # Pavements of edges shorter than the junction reach into it, and some between wide angles lie beyond it: the
+            # carriageway is where vehicles drive, and a little more at corners where none turns.
+            filled = united(shapely.Polygon(part.exterior) for part in shapely.get_parts(closed(lanes_there, BIKE_LANE)))
+            area = united([area.intersection(filled.buffer(CORNER)), lanes_there])
+        walked = united([*walking[node], without(whole, area)])
         yield JunctionArea(node, area, walked, frozenset(roads[node]), node in joints)
 
 

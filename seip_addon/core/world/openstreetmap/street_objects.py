@@ -235,5 +235,5 @@ def _side_ways(shapes: PlanShapes, area: BaseGeometry) -> Iterator[SideWay]:
                 yield SideWay(outline, material, name, rule)
             continue
         width = metres(tags.get("width"), MAX_BARRIER) or usual
-        along = line if name == FOOTWAYS else None
+        along = line if "sidewalk" in (tags.get("footway"), tags.get("path")) else None
         yield SideWay(shapely.LineString(line).buffer(width / 2), material, name, rule, along, width)

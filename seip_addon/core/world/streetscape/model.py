@@ -51,7 +51,7 @@ from .road_checks import road_warnings
 from .road_surface import Roadside, SurfaceLayers, without_crumbs
 from .roofs import house
 from .signal_posts import signal_parts, split_posts
-from .street_areas import MAX_MAPPED, Sidewalk, StreetAreas, street_areas
+from .street_areas import MAX_MAPPED, NOTHING, Sidewalk, StreetAreas, street_areas
 from .street_map import JunctionArea, StreetMap, opendrive_streets
 from .terrain import Embankments, FlatLand, Relief, Terrain, cut, embankment_width
 
@@ -175,6 +175,8 @@ class _Surroundings:
     ----------
     areas : StreetAreas or None
         Areas of the street in a network; in OpenDRIVE the surfaces are those of the lanes.
+    built_up : shapely geometry
+        Area of the buildings next to a network, where no post stands.
     terrain : Terrain
         Heights of the studied roads, and of the ground next to them.
     ground : Terrain
@@ -184,6 +186,7 @@ class _Surroundings:
     origin: Float
     lanes: tuple[LaneSurface, ...]
     areas: StreetAreas | None
+    built_up: BaseGeometry
     region: BaseGeometry
     extent: BaseGeometry
     roadside: Roadside
@@ -579,7 +582,13 @@ def _surroundings(
     if description.from_centre_lines:
         lanes = road_surface.without_loose_ends(lanes, region, extent)
     others = _strips(levels.others, origin, extent, relief, kerbs=False)
-    areas = _areas(streets, lanes, origin, extent, description) if streets.junctions else None
+    areas, houses = None, NOTHING
+    if streets.junctions:
+        houses = united(shifted(one.outline, -origin) for one in (*description.buildings, *description.solids))
+        sidewalks = [Sidewalk(one.line - origin[:2], one.width) for one in description.ways if one.line is not None]
+        junctions = (_local_junction(one, origin) for one in streets.junctions)
+        near = [one for one in junctions if extent.intersects(one.carriageway)]
+        areas = street_areas(lanes, near, {road.id: road for road in streets.road_map.roads}, sidewalks, houses)
     roadside = road_surface.roadside(lanes) if areas is None else areas.roadside
     shapely.prepare(roadside.carriageway)
     land = description.relief or description.flat_land
@@ -587,22 +596,7 @@ def _surroundings(
     beyond = shapely.box(*extent.buffer(10 * road_surface.MAX_STEP).bounds).difference(extent)
     above, below, on_ground = (cut(part, beyond) for part in (crossing.above, crossing.below, crossing.on_ground))
     crossing = replace(crossing, above=above, below=below, on_ground=on_ground)
-    return _Surroundings(origin, lanes, areas, region, extent, roadside, terrain, ground, relief, land, crossing)
-
-
-def _areas(
-    streets: StreetMap,
-    lanes: tuple[LaneSurface, ...],
-    origin: Float,
-    extent: BaseGeometry,
-    description: SiteDescription,
-) -> StreetAreas:
-    """Return the areas of the streets of a network near a place, in local axes."""
-    junctions = (_local_junction(one, origin) for one in streets.junctions)
-    near = [one for one in junctions if extent.intersects(one.carriageway)]
-    sidewalks = [Sidewalk(one.line - origin[:2], one.width) for one in description.ways if one.line is not None]
-    houses = united(shifted(one.outline, -origin) for one in (*description.buildings, *description.solids))
-    return street_areas(lanes, near, {road.id: road for road in streets.road_map.roads}, sidewalks, houses)
+    return _Surroundings(origin, lanes, areas, houses, region, extent, roadside, terrain, ground, relief, land, crossing)
 
 
 def _local_junction(junction: JunctionArea, origin: Float) -> JunctionArea:
@@ -795,7 +789,7 @@ def _verge_strip(street: _Surroundings, sides: BaseGeometry) -> Part:
     """Return a strip of verge along sides of the carriageway, except where the road continues and next to bridges."""
     inner, outer = VERGE_STRIP
     strip = without(sides.buffer(outer, cap_style="flat"), street.roadside.filled.buffer(inner))
-    strip = without(strip, street.crossing.off_posts.buffer(outer))
+    strip = without(strip, united([street.crossing.off_posts.buffer(outer), street.built_up]))
     near = strip.intersection(street.region.buffer(CANDIDATE_MARGIN))
     return _area_part("Verge strip", near, Role.CANDIDATE_AREAS, street)
 

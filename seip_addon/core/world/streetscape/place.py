@@ -149,7 +149,10 @@ class Place:
         whole = closed(united([area, *inside]), JUNCTION_GAP)
         links = [own for own in road_surface.by_road(nearby).values() if all(leads_between(lane, whole) for lane in own)]
         whole = united([whole, *(lane.polygon for own in links for lane in own)])
-        return road_surface.without_crumbs(closed(whole, JUNCTION_GAP), least=MIN_ISLAND_AREA)
+        whole = closed(whole, JUNCTION_GAP)
+        # Mitred corners of the closing that lie outside the road are narrow: shrinking and growing removes them.
+        opened = whole.buffer(-JUNCTION_GAP, join_style="mitre").buffer(JUNCTION_GAP, join_style="mitre")
+        return road_surface.without_crumbs(opened, least=MIN_ISLAND_AREA)
 
     def weighted_areas(self) -> list[tuple[str, BaseGeometry, float]]:
         """Return name, area and weight of the weighted regions.

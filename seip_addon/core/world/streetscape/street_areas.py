@@ -29,6 +29,7 @@ from .road_surface import (
 )
 from .street_map import JunctionArea
 
+NOTHING = shapely.Polygon()
 MIN_HOLE = 0.01  # m²: smaller holes are rounding
 MIN_ROAD_AREA = 5.0  # m²: smaller parts of a carriageway are crumbs
 MAX_REFUGE = 60.0  # m²: smaller holes of a carriageway at junctions are where its lanes leave gaps
@@ -43,6 +44,7 @@ MIN_JUMP, MAX_JUMP = 0.5, 8.0  # metres: smaller jumps of an edge need no taper,
 MAX_SHARE = 0.9  # largest share of a road's length that its taper takes
 MIN_MEDIAN = 4.0  # metres that remain to the next carriageway: otherwise a median would be closed
 TAPER_STEP = 5.0  # metres between the rows of a taper
+MIN_ASSUMED = 15.0  # m²: smaller rests of assumed pavements between mapped ones are left out
 MAX_MAPPED = 12.0  # metres from the carriageway to a mapped sidewalk that is the pavement of its street
 
 
@@ -91,7 +93,7 @@ def street_areas(
     junctions: Sequence[JunctionArea],
     roads: Mapping[str, Road],
     sidewalks: Sequence[Sidewalk] = (),
-    built_up: BaseGeometry | None = None,
+    built_up: BaseGeometry = NOTHING,
 ) -> StreetAreas:
     """Return the areas of a street on one level.
 
@@ -119,12 +121,15 @@ def street_areas(
     inside = united(one.carriageway for one in junctions if not one.is_joint)
     side = roadside(lanes, carriageway)
     walked = _walked(lanes, junctions, tapers, carriageway)
+    # A mapped line within the carriageway says no more than that the pavement is narrow: the assumed one stays there.
+    lines = united(shapely.LineString(one.line) for one in sidewalks)
+    lines = without(lines, carriageway.buffer(GAP))
     mapped = united(one.area for one in sidewalks if one.area.dwithin(carriageway, MAX_MAPPED))
     # What lies between carriageways or on an island of the street is no pavement unless it is mapped as one.
-    pavement = without(walked, united([_towards(side, sidewalks), _medians(side)]))
-    pavement = without(_smooth(united([pavement, mapped]), carriageway), carriageway)
-    if built_up is not None:
-        pavement = without(pavement, built_up)
+    assumed = without(_smooth(walked, carriageway), united([_towards(side, lines), _medians(side)]))
+    assumed = without_crumbs(assumed, least=MIN_ASSUMED) if len(sidewalks) else assumed
+    pavement = without(united([assumed, _at_kerb(mapped, carriageway)]), carriageway)
+    pavement = without(pavement, built_up)
     return StreetAreas(dict(_groups(strips, carriageway, inside)), without_crumbs(pavement), side, inside)
 
 
@@ -135,7 +140,8 @@ def _carriageway(strips: Sequence[BaseGeometry], junctions: Sequence[JunctionAre
     gaps = without(closed(area, GAP), area).intersection(around)
     whole = without_crumbs(united([area, gaps]), least=MIN_HOLE)
     holes = [shapely.Polygon(ring) for part in shapely.get_parts(whole) for ring in part.interiors]
-    islands = [one for one in holes if one.area < (MAX_REFUGE if one.intersects(around) else MIN_ISLAND_AREA)]
+    near = around.buffer(AROUND_JUNCTION)
+    islands = [one for one in holes if one.area < (MAX_REFUGE if near.covers(one) else MIN_ISLAND_AREA)]
     return without_crumbs(united([whole, *islands]), least=MIN_ROAD_AREA)
 
 
@@ -181,15 +187,19 @@ def _smooth(pavement: BaseGeometry, carriageway: BaseGeometry) -> BaseGeometry:
     return wide.buffer(MIN_PAVEMENT_WIDTH / 2, join_style="mitre")
 
 
-def _towards(side: Roadside, sidewalks: Sequence[Sidewalk]) -> BaseGeometry:
-    """Return the ground from the carriageway to the mapped sidewalks along it."""
-    mapped = united(shapely.LineString(one.line) for one in sidewalks)
+def _at_kerb(mapped: BaseGeometry, carriageway: BaseGeometry) -> BaseGeometry:
+    """Return mapped sidewalks, with narrow gaps between them and the carriageway closed."""
+    street = united([mapped, carriageway])
+    return united([mapped, without(closed(street, GAP), street).intersection(mapped.buffer(2 * GAP))])
+
+
+def _towards(side: Roadside, mapped: BaseGeometry) -> BaseGeometry:
+    """Return the ground from the carriageway to the mapped sidewalks along it, whose lines are given."""
     if mapped.is_empty:
         return mapped
     start, stop, outwards = side_pieces(side)
-    strips = shapely.polygons(
-        np.stack([start, stop, stop + MAX_MAPPED * outwards, start + MAX_MAPPED * outwards], axis=1)
-    )
+    beyond = MAX_MAPPED * outwards
+    strips = shapely.polygons(np.stack([start, stop, stop + beyond, start + beyond], axis=1))
     shapely.prepare(mapped)
     return united(strips[shapely.intersects(mapped, strips)])
 
