@@ -1,6 +1,7 @@
 """Triangles in plan: areas, outlines and heights; and robust operations on areas."""
 
 from collections.abc import Iterable
+from typing import Literal
 
 import numpy as np
 import shapely
@@ -50,11 +51,14 @@ def united(areas: Iterable[BaseGeometry]) -> BaseGeometry:
     return shapely.union_all([shapely.make_valid(area) for area in areas], grid_size=_OVERLAY_GRID)
 
 
-def closed(area: BaseGeometry, gap: float) -> BaseGeometry:
-    """Return an area in plan with cracks and gaps up to twice ``gap`` metres filled."""
-    # Morphological closing. Mitred joins bring straight edges and corners back to where they were.
-    wider = _without_twins(area).buffer(gap, join_style="mitre")
-    return _without_twins(wider).buffer(-gap, join_style="mitre")
+def closed(area: BaseGeometry, gap: float, join: Literal["mitre", "round"] = "mitre") -> BaseGeometry:
+    """Return an area in plan with cracks and gaps up to twice ``gap`` metres filled.
+
+    Mitred joins bring straight edges and corners back to where they were. Where the gap is wider than the bends of the
+    outline, they fill more than the gap; round joins do not.
+    """
+    wider = _without_twins(area).buffer(gap, join_style=join)  # morphological closing
+    return _without_twins(wider).buffer(-gap, join_style=join)
 
 
 def _without_twins(area: BaseGeometry) -> BaseGeometry:

@@ -30,7 +30,7 @@ from .intersections import (
 from .levels import Levels, split_levels
 from .named_places import street_names
 from .street_areas import GAP as JUNCTION_GAP
-from .street_areas import MIN_ISLAND_AREA
+from .street_areas import MIN_ISLAND_AREA, TOLERANCE
 from .street_map import JunctionArea
 
 MIN_SHARE_OF_JUNCTION = 0.5  # share of a junction's area in a region from which on the region includes all of it
@@ -146,13 +146,13 @@ class Place:
         there = {lane.road_id for lane in nearby}
         junctions = [shifted(one.carriageway, -shift) for one in self.junctions if there & one.roads]
         inside = [one for one in junctions if one.intersection(area).area > MIN_SHARE_OF_JUNCTION * one.area]
-        whole = closed(united([area, *inside]), JUNCTION_GAP)
+        whole = closed(united([area, *inside]).simplify(TOLERANCE), JUNCTION_GAP)
         links = [own for own in road_surface.by_road(nearby).values() if all(leads_between(lane, whole) for lane in own)]
         whole = united([whole, *(lane.polygon for own in links for lane in own)])
-        whole = closed(whole, JUNCTION_GAP)
-        # Mitred corners of the closing that lie outside the road are narrow: shrinking and growing removes them.
-        opened = whole.buffer(-JUNCTION_GAP, join_style="mitre").buffer(JUNCTION_GAP, join_style="mitre")
-        return road_surface.without_crumbs(opened, least=MIN_ISLAND_AREA)
+        # Mitred corners of the closing that lie outside the road are no part of it.
+        road = united([*(lane.polygon for lane in nearby), *junctions]).buffer(JUNCTION_GAP / 2)
+        whole = closed(whole.simplify(TOLERANCE), JUNCTION_GAP).intersection(road)
+        return road_surface.without_crumbs(whole, least=MIN_ISLAND_AREA)
 
     def weighted_areas(self) -> list[tuple[str, BaseGeometry, float]]:
         """Return name, area and weight of the weighted regions.

@@ -3,6 +3,7 @@
 import dataclasses
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 import shapely
@@ -106,12 +107,13 @@ def roadside(surfaces: Sequence[LaneSurface], carriageway: BaseGeometry | None =
     100
     """
     paved = in_groups(surfaces, CARRIAGEWAY)
+    join: Literal["mitre", "round"] = "mitre" if carriageway is None else "round"
     carriageway = lane_outline(paved) if carriageway is None else carriageway
     junctions = sorted({lane.junction_id for lane in paved if lane.junction_id is not None})
     inside = [lane_outline([lane for lane in paved if lane.junction_id == junction]) for junction in junctions]
     whole = shapely.union_all([carriageway, *map(_without_holes, inside)])
     # Morphological closing fills gaps between carriageways that are open at an end, and therefore not holes.
-    medians = without(closed(whole, MAX_OPEN_MEDIAN_WIDTH / 2), whole)
+    medians = without(closed(whole, MAX_OPEN_MEDIAN_WIDTH / 2, join), whole)
     filled = _without_holes(closed(whole.union(medians), MAX_SEAM), least=MAX_ISLAND_AREA, narrow=MAX_MEDIAN_WIDTH)
     # A lane that ends at the edge of the filled area leads out of the model: there the edge is not a side of the road.
     # Ends of lanes where another lane follows lie inside, and only touch the edge with a corner.

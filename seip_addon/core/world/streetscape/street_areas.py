@@ -33,6 +33,7 @@ NOTHING = shapely.Polygon()
 MIN_HOLE = 0.01  # m²: smaller holes are rounding
 MIN_ROAD_AREA = 5.0  # m²: smaller parts of a carriageway are crumbs
 MAX_REFUGE = 60.0  # m²: smaller holes of a carriageway at junctions are where its lanes leave gaps
+TOLERANCE = 0.02  # metres: corners of outlines nearer to the line between their neighbours are left out
 GAP = 0.5  # metres: gaps up to twice this between lanes and junctions are closed
 AROUND_JUNCTION = 3.0  # metres from a junction within which such gaps lie
 MIN_ISLAND_AREA = 15.0  # m²: smaller holes of the carriageway are not islands
@@ -126,7 +127,7 @@ def street_areas(
     lines = without(lines, carriageway.buffer(GAP))
     mapped = united(one.area for one in sidewalks if one.area.dwithin(carriageway, MAX_MAPPED))
     # What lies between carriageways or on an island of the street is no pavement unless it is mapped as one.
-    assumed = without(_smooth(walked, carriageway), united([_towards(side, lines), _medians(side)]))
+    assumed = _wide(without(_filled(walked, carriageway), united([_towards(side, lines), _medians(side)])))
     assumed = without_crumbs(assumed, least=MIN_ASSUMED) if len(sidewalks) else assumed
     pavement = without(united([assumed, _at_kerb(mapped, carriageway)]), carriageway)
     pavement = without(pavement, built_up)
@@ -135,14 +136,15 @@ def street_areas(
 
 def _carriageway(strips: Sequence[BaseGeometry], junctions: Sequence[JunctionArea]) -> BaseGeometry:
     """Return the union of strips and junctions, with gaps closed where they meet and small holes filled."""
-    area = united([*strips, *(one.carriageway for one in junctions)])
+    # Without corners that are hardly any: mitred buffers make spikes of these.
+    area = united([*strips, *(one.carriageway for one in junctions)]).simplify(TOLERANCE)
     around = united(one.carriageway.buffer(AROUND_JUNCTION) for one in junctions)
     gaps = without(closed(area, GAP), area).intersection(around)
     whole = without_crumbs(united([area, gaps]), least=MIN_HOLE)
     holes = [shapely.Polygon(ring) for part in shapely.get_parts(whole) for ring in part.interiors]
     near = around.buffer(AROUND_JUNCTION)
     islands = [one for one in holes if one.area < (MAX_REFUGE if near.covers(one) else MIN_ISLAND_AREA)]
-    return without_crumbs(united([whole, *islands]), least=MIN_ROAD_AREA)
+    return without_crumbs(united([whole, *islands]).simplify(TOLERANCE), least=MIN_ROAD_AREA)
 
 
 def _medians(side: Roadside) -> BaseGeometry:
@@ -177,13 +179,16 @@ def _walked(
     return united([*strips, corners, *(one.pavement for one in tapers)])
 
 
-def _smooth(pavement: BaseGeometry, carriageway: BaseGeometry) -> BaseGeometry:
-    """Return pavements without small notches next to the carriageway, and without parts too narrow to walk on."""
-    street = united([pavement, carriageway])
-    filled = without(closed(street, SMALL_NOTCH), carriageway)
-    near = united([pavement, filled.intersection(pavement.buffer(SMALL_NOTCH))])
+def _filled(pavement: BaseGeometry, carriageway: BaseGeometry) -> BaseGeometry:
+    """Return pavements outside the carriageway with small notches closed."""
+    notches = without(closed(united([pavement, carriageway]), SMALL_NOTCH, "round"), carriageway)
+    return without(united([pavement, notches.intersection(pavement.buffer(SMALL_NOTCH))]), carriageway)
+
+
+def _wide(pavement: BaseGeometry) -> BaseGeometry:
+    """Return pavements without parts that are too narrow to walk on."""
     # Morphological opening: what vanishes when the area shrinks and grows again is narrower than the width.
-    wide = without(near, carriageway).buffer(-MIN_PAVEMENT_WIDTH / 2, join_style="mitre")
+    wide = pavement.buffer(-MIN_PAVEMENT_WIDTH / 2, join_style="mitre")
     return wide.buffer(MIN_PAVEMENT_WIDTH / 2, join_style="mitre")
 
 
