@@ -6,7 +6,7 @@ In Blender, on the scene that is open::
 
 or as plain Python on the bpy module::
 
-    seip traffic site.blend --simulate site.xodr --flow 600 --seed 1 --duration 120 -o traffic.npz
+    seip traffic site.blend --simulate site.net.xml --flow 600 --seed 1 --duration 120 -o traffic.npz
 """
 
 import argparse

@@ -87,12 +87,7 @@ def placed_objects(road_map: RoadMap) -> tuple[PlacedObject, ...]:
     SeipError
         An object is repeated too often.
     """
-    return tuple(
-        placed
-        for road in road_map.roads
-        for obj in road.objects
-        for placed in _placed(road, obj)
-    )
+    return tuple(placed for road in road_map.roads for obj in road.objects for placed in _placed(road, obj))
 
 
 def extent_in_plan(placed: PlacedObject) -> BaseGeometry:

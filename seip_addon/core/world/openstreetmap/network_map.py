@@ -32,6 +32,7 @@ from ..streetscape.named_places import CROSSING
 from ..streetscape.street_map import JunctionArea, Profiles, StreetMap
 
 _LANE = re.compile(r'(<lane id=")([^"]*)("[^>]*? shape=")([^"]*)"')
+_Areas = defaultdict[str, list[BaseGeometry]]
 MIN_ARMS = 3  # arms of a junction; where fewer meet, a street continues
 ARM_GAP = 2.0  # metres between two ends of carriageways of one arm at most
 MAX_MERGING = 4  # ends of edges where the directions of one street divide: two of each direction
@@ -78,6 +79,11 @@ class _Reader:
         self.connections: list[Attributes] = []
         self._current = ""
 
+    def lane(self, number: str) -> _Lane:
+        """Return a lane by its id: that of its edge, and its number there."""
+        edge, _, index = number.rpartition("_")
+        return self.edges[edge].lanes[int(index)]
+
     def read_element(self, tag: str, given: Attributes) -> None:
         """Read an element."""
         if tag == "net":
@@ -86,8 +92,8 @@ class _Reader:
             self.location = given
         elif tag == "edge":
             self._current = given["id"]
-            own = (given.get(key, "") for key in ("function", "from", "to", "name"))
-            self.edges[self._current] = _Edge(self._current, *own)
+            function, begin, end, name = (given.get(key, "") for key in ("function", "from", "to", "name"))
+            self.edges[self._current] = _Edge(self._current, function, begin, end, name)
         elif tag == "lane":
             default = CROSSING_WIDTH if self.edges[self._current].function == "crossing" else LANE_WIDTH
             lane = _Lane(_type(given), float(given.get("width", default)), _points(given["shape"]))
@@ -133,9 +139,9 @@ class Network:
         return _LANE.sub(raised, self.text)
 
 
-def credited(text: str, credits: Iterable[str]) -> str:
-    """Return the text of a network with credits to the sources of its data."""
-    lines = "".join(f"<!-- {one.replace('--', '-')} -->\n" for one in credits)
+def credited(text: str, attribution: Iterable[str]) -> str:
+    """Return the text of a network with credits to the sources of its data, as comments."""
+    lines = "".join(f"<!-- {one.replace('--', '-')} -->\n" for one in attribution)
     head, mark, rest = text.partition("<net ")
     return f"{head}{lines}{mark}{rest}"
 
@@ -184,7 +190,7 @@ def read_network(path: Path) -> Network:
 def _points(shape: str) -> Float:
     """Return the points (n, 3) of a shape, without repeated ones."""
     rows = [[float(value) for value in point.split(",")] for point in shape.split()]
-    points = np.array([(*row, 0.0)[:3] for row in rows])
+    points: Float = np.array([(*row, 0.0)[:3] for row in rows])
     steps = np.hypot(*np.diff(points[:, :2], axis=0).T)
     return points[np.concatenate([[True], steps > MIN_STEP])]
 
@@ -237,9 +243,7 @@ def _directions(headings: Sequence[float]) -> int:
     return len(found)
 
 
-def _roads(
-    reader: _Reader, pieces: dict[str, tuple[str, float, float]]
-) -> Iterator[tuple[Road, list[LaneSurface]]]:
+def _roads(reader: _Reader, pieces: dict[str, tuple[str, float, float]]) -> Iterator[tuple[Road, list[LaneSurface]]]:
     """Yield the roads outside and within junctions, with their lanes; add the roads of internal lanes to ``pieces``."""
     for edge in reader.edges.values():
         if not edge.function:
@@ -274,14 +278,13 @@ def _connecting(
         while via is not None:
             chain.append(via)
             via = onward[via].get("via") if via in onward else None
-        parts = [reader.edges[edge].lanes[int(number)].line for edge, _, number in (one.rpartition("_") for one in chain)]
+        parts = [reader.lane(one).line for one in chain]
         ends = np.concatenate([[0.0], np.cumsum([max(_length(part), MIN_STEP) for part in parts])])
         ends /= ends[-1]
         pieces |= {one: (first, *span) for one, span in zip(chain, itertools.pairwise(ends.tolist()), strict=True)}
         line = np.concatenate(parts)
         line = line[np.concatenate([[True], np.hypot(*np.diff(line[:, :2], axis=0).T) > MIN_STEP])]
-        source = reader.edges[one["from"]].lanes[int(one["fromLane"])]
-        target = reader.edges[one["to"]].lanes[int(one["toLane"])]
+        source, target = (reader.lane(f"{one[end]}_{one[f'{end}Lane']}") for end in ("from", "to"))
         if len(line) > 1 and source.type and target.type:
             # A cycle lane that leads into a driving lane ends where the junction begins.
             kind = source.type if source.type == target.type else "driving"
@@ -304,10 +307,11 @@ def _road(
     # All lanes get the same rows: at the same share of their length, so that neighbours keep a common edge.
     shares = [_shares(lanes[one].line) for one in order]
     rows = np.unique(np.round(np.concatenate(shares), 9))
-    edges = [
-        _edges(np.column_stack([np.interp(rows, share, lanes[one].line[:, axis]) for axis in range(3)]), lanes[one].width)
+    lines = (
+        np.column_stack([np.interp(rows, share, lanes[one].line[:, axis]) for axis in range(3)])
         for one, share in zip(order, shares, strict=True)
-    ]
+    )
+    edges = [_edges(line, lanes[one].width) for one, line in zip(order, lines, strict=True)]
     reference = edges[0][1 if left_hand else 0]
     steps = np.hypot(*np.diff(reference[:, :2], axis=0).T)
     s = np.concatenate([[0.0], np.cumsum(np.maximum(steps, MIN_STEP))])
@@ -365,37 +369,36 @@ def _edges(line: Float, width: float) -> tuple[Float, Float]:
     return line + aside, line - aside
 
 
-def _junction_areas(
-    reader: _Reader, lanes: Sequence[LaneSurface], joints: frozenset[str]
-) -> Iterator[JunctionArea]:
+def _junction_areas(reader: _Reader, lanes: Sequence[LaneSurface], joints: frozenset[str]) -> Iterator[JunctionArea]:
     """Yield the areas of the junctions."""
-    walking: defaultdict[str, list[BaseGeometry]] = defaultdict(list)
+    roads, walking, driven = defaultdict[str, set[str]](set), _Areas(list), _Areas(list)
     for edge in reader.edges.values():
         if edge.function == "walkingarea":
-            node = edge.id[1:].rpartition("_w")[0]
-            walking[node] += [_polygon(lane.line) for lane in edge.lanes.values()]
-    roads: defaultdict[str, set[str]] = defaultdict(set)
+            walking[edge.id[1:].rpartition("_w")[0]] += [_polygon(lane.line) for lane in edge.lanes.values()]
+        elif not edge.function:
+            roads[edge.begin].add(edge.id)
+            roads[edge.end].add(edge.id)
     for lane in lanes:
         if lane.junction_id is not None:
             roads[lane.junction_id].add(lane.road_id)
-    for edge in reader.edges.values():
-        if not edge.function:
-            roads[edge.begin].add(edge.id)
-            roads[edge.end].add(edge.id)
-    driven: defaultdict[str, list[BaseGeometry]] = defaultdict(list)
-    for lane in lanes:
-        if lane.junction_id is not None and lane.lane_type == "driving":
-            driven[lane.junction_id].append(lane.polygon)
+            driven[lane.junction_id] += [lane.polygon] * (lane.lane_type == "driving")
     for node, shape in reader.shapes.items():
-        whole, lanes_there = _polygon(shape), united(driven[node])
-        area = without(whole, united(walking[node]))
-        if not lanes_there.is_empty:
-            # Pavements of edges shorter than the junction reach into it, and some between wide angles lie beyond it: the
-            # carriageway is where vehicles drive, and a little more at corners where none turns.
-            filled = united(shapely.Polygon(part.exterior) for part in shapely.get_parts(closed(lanes_there, BIKE_LANE)))
-            area = united([area.intersection(filled.buffer(CORNER)), lanes_there])
+        whole = _polygon(shape)
+        area = _driven_area(without(whole, united(walking[node])), united(driven[node]))
         walked = united([*walking[node], without(whole, area)])
         yield JunctionArea(node, area, walked, frozenset(roads[node]), node in joints)
+
+
+def _driven_area(area: BaseGeometry, lanes: BaseGeometry) -> BaseGeometry:
+    """Return the carriageway of a junction from its area without pavements, and from the lanes through it.
+
+    Pavements of edges shorter than the junction reach into it, and some between wide angles lie beyond it: the
+    carriageway is where vehicles drive, and a little more at corners where none turns.
+    """
+    if lanes.is_empty:
+        return area
+    filled = united(shapely.Polygon(part.exterior) for part in shapely.get_parts(closed(lanes, BIKE_LANE)))
+    return united([area.intersection(filled.buffer(CORNER)), lanes])
 
 
 def _polygon(line: Float) -> BaseGeometry:
@@ -435,4 +438,5 @@ def _signals(reader: _Reader) -> Iterator[PlacedSignal]:
                 x, y = (own.line[-1] - own.line[-2])[:2]
                 position = own.line[-1] + [0.0, 0.0, LAMP_HEIGHT]
                 number = f"{one['tl']}_{one['linkIndex']}"
-                yield PlacedSignal(edge.id, number, "", "1000011", True, position, math.atan2(y, x))
+                heading = math.atan2(y, x)
+                yield PlacedSignal(edge.id, number, "", "1000011", dynamic=True, position=position, yaw=heading)

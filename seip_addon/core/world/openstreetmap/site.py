@@ -224,7 +224,7 @@ def site_of_extract(
     junction = extent.junction
     description = replace(
         stands_there,
-        name=_name(extract, streets, source, place, near, extent, in_tunnel=bool(tunnels)),
+        name=_name(extract, streets, source, place, extent, in_tunnel=bool(tunnels)),
         near=None if place.radius is None else (float(extent.middle[0]), float(extent.middle[1])),
         junction=junction.id if place.radius is None and junction is not None else None,
         radius=place.radius,
@@ -286,8 +286,10 @@ class _Extent:
 
     Parameters
     ----------
-    middle : (2,) float64, metres
+    near : (latitude, longitude), degrees
         Position of the place.
+    middle : (2,) float64, metres
+        The same in map coordinates.
     junction : Junction or None
         Nearest junction.
     away : float, metres
@@ -302,6 +304,7 @@ class _Extent:
         Carriageway within it.
     """
 
+    near: tuple[float, float]
     middle: Float
     junction: Junction | None
     away: float
@@ -335,6 +338,7 @@ def _extent(
     size = _reach(lanes, together, middle) + place.along
     reach = place.reach if place.radius else max(place.reach, size)
     return _Extent(
+        near,
         middle,
         junction,
         away,
@@ -350,7 +354,6 @@ def _name(
     streets: StreetMap,
     source: StreetFile,
     place: ExtractPlace,
-    near: tuple[float, float],
     extent: _Extent,
     *,
     in_tunnel: bool,
@@ -363,7 +366,7 @@ def _name(
         names = _title(streets.road_map, streets.lanes, titled, extent.middle, extent.roundabouts, ranks)
     if names:
         return STREETS.join(names)
-    latitude, longitude = near
+    latitude, longitude = extent.near
     kind = "Junction" if extent.away <= (place.radius or math.inf) else "Street"
     return f"{kind} at {latitude:.5f}, {longitude:.5f}"
 

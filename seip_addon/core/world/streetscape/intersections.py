@@ -12,7 +12,6 @@ import shapely
 from shapely.affinity import rotate
 from shapely.geometry.base import BaseGeometry
 
-from ...arrays import Float
 from ...geometry.plan import closed, united
 from ..opendrive.junctions import junction_area
 from ..opendrive.lanes import LaneSurface

@@ -584,7 +584,8 @@ def _surroundings(
     others = _strips(levels.others, origin, extent, relief, kerbs=False)
     areas, houses = None, NOTHING
     if streets.junctions:
-        houses = united(shifted(one.outline, -origin) for one in (*description.buildings, *description.solids))
+        outlines = [one.outline for one in description.buildings] + [one.outline for one in description.solids]
+        houses = united(shifted(one, -origin) for one in outlines)
         sidewalks = [Sidewalk(one.line - origin[:2], one.width) for one in description.ways if one.line is not None]
         junctions = (_local_junction(one, origin) for one in streets.junctions)
         near = [one for one in junctions if extent.intersects(one.carriageway)]
@@ -596,7 +597,9 @@ def _surroundings(
     beyond = shapely.box(*extent.buffer(10 * road_surface.MAX_STEP).bounds).difference(extent)
     above, below, on_ground = (cut(part, beyond) for part in (crossing.above, crossing.below, crossing.on_ground))
     crossing = replace(crossing, above=above, below=below, on_ground=on_ground)
-    return _Surroundings(origin, lanes, areas, houses, region, extent, roadside, terrain, ground, relief, land, crossing)
+    return _Surroundings(
+        origin, lanes, areas, houses, region, extent, roadside, terrain, ground, relief, land, crossing
+    )
 
 
 def _local_junction(junction: JunctionArea, origin: Float) -> JunctionArea:

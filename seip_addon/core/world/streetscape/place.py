@@ -147,7 +147,9 @@ class Place:
         junctions = [shifted(one.carriageway, -shift) for one in self.junctions if there & one.roads]
         inside = [one for one in junctions if one.intersection(area).area > MIN_SHARE_OF_JUNCTION * one.area]
         whole = closed(united([area, *inside]).simplify(TOLERANCE), JUNCTION_GAP)
-        links = [own for own in road_surface.by_road(nearby).values() if all(leads_between(lane, whole) for lane in own)]
+        links = [
+            own for own in road_surface.by_road(nearby).values() if all(leads_between(lane, whole) for lane in own)
+        ]
         whole = united([whole, *(lane.polygon for own in links for lane in own)])
         # Mitred corners of the closing that lie outside the road are no part of it.
         road = united([*(lane.polygon for lane in nearby), *junctions]).buffer(JUNCTION_GAP / 2)

@@ -124,9 +124,7 @@ def roadside(surfaces: Sequence[LaneSurface], carriageway: BaseGeometry | None =
     return Roadside(carriageway, filled, shapely.union_all(across[(length > 2 * MAX_SEAM) & (at_edge > length / 2)]))
 
 
-def bare_sides(
-    roadside: Roadside, pavement: BaseGeometry, distance: float = MAX_PAVEMENT_DISTANCE
-) -> BaseGeometry:
+def bare_sides(roadside: Roadside, pavement: BaseGeometry, distance: float = MAX_PAVEMENT_DISTANCE) -> BaseGeometry:
     """Return the sides of the carriageway without a pavement within a distance in metres, as lines."""
     sides = roadside.sides()
     if pavement.is_empty or sides.is_empty:

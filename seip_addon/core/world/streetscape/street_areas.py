@@ -5,7 +5,7 @@ closed, is the carriageway; all other surfaces are what is left of their lanes o
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import shapely
@@ -107,7 +107,7 @@ def street_areas(
     roads : mapping of str to Road
         Roads of the map by id.
     sidewalks : sequence of Sidewalk
-        Pavements that are mapped as lines. Where one runs along a street, it is the pavement there, and none is assumed.
+        Pavements that are mapped as lines. Where one runs along a street, none is assumed.
     built_up : shapely geometry, optional
         Area of buildings, where no pavement lies.
     """

@@ -12,15 +12,13 @@ from ...errors import SeipError
 from ...progress import Progress
 from ...sensing.traffic.source import TrafficFiles
 from ...storage.files import whole_file
-from ...sumo_programs import Sumo, find_sumo, run
+from ...sumo_programs import NETWORK_SUFFIX, Sumo, find_sumo, run
 from ..opendrive.read import read_map
 from ..opendrive.road_map import RoadMap
 from ..streetscape.road_surface import GROUPS
 from .demand import Demand, write_routes
 from .street_network import PARKED_CLASS, StreetNetwork, read_network
 
-NETWORK_SUFFIX = ".net.xml"
-"""End of the name of a network of SUMO, as the streets of an extract have it."""
 STEP_SECONDS = 0.1  # seconds between two steps of the simulation
 SAMPLING_SECONDS = 0.2  # seconds between two samples of the trajectories
 _LANE_CHANGE_SECONDS = 4.0  # seconds; without it SUMO's vehicles jump from lane to lane
