@@ -7,9 +7,9 @@ from pathlib import Path
 from ...errors import SeipError
 from ...progress import Progress
 from ...sumo_programs import find_sumo, run
+from .network_map import PRECISION
 from .streets import JOIN_DISTANCE, SIDEWALK_WIDTH, StreetFile
 
-PRECISION = 3  # decimal places of coordinates, metres
 TYPE_FILES = ("osmNetconvert.typ.xml", "osmNetconvertBicycle.typ.xml")
 
 

@@ -11,6 +11,7 @@ from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from xml.sax.saxutils import unescape
 
 import numpy as np
 import shapely
@@ -32,7 +33,9 @@ from ..streetscape.named_places import CROSSING
 from ..streetscape.street_map import JunctionArea, Profiles, StreetMap
 
 _LANE = re.compile(r'(<lane id=")([^"]*)("[^>]*? shape=")([^"]*)"')
+QUOTES = {"&apos;": "'", "&quot;": '"'}
 _Areas = defaultdict[str, list[BaseGeometry]]
+PRECISION = 3  # decimal places of coordinates, metres
 MIN_ARMS = 3  # arms of a junction; where fewer meet, a street continues
 ARM_GAP = 2.0  # metres between two ends of carriageways of one arm at most
 MAX_MERGING = 4  # ends of edges where the directions of one street divide: two of each direction
@@ -93,7 +96,8 @@ class _Reader:
         elif tag == "edge":
             self._current = given["id"]
             function, begin, end, name = (given.get(key, "") for key in ("function", "from", "to", "name"))
-            self.edges[self._current] = _Edge(self._current, function, begin, end, name)
+            # netconvert escapes the names of streets twice: "Smith & Sons" arrives as "Smith &amp; Sons".
+            self.edges[self._current] = _Edge(self._current, function, begin, end, unescape(name, QUOTES))
         elif tag == "lane":
             default = CROSSING_WIDTH if self.edges[self._current].function == "crossing" else LANE_WIDTH
             lane = _Lane(_type(given), float(given.get("width", default)), _points(given["shape"]))
@@ -131,9 +135,15 @@ class Network:
                 return match[0]
             line = _points(match[4])
             along, heights = profiles[number]
-            at = (low + (high - low) * _shares(line)) * along[-1] if len(line) > 1 else np.array([low * along[-1]])
-            rows = zip(line[:, :2].tolist(), np.interp(at, along, heights).tolist(), strict=True)
-            shape = " ".join(f"{x:.3f},{y:.3f},{z:.3f}" for (x, y), z in rows)
+            if len(line) < 2:
+                return match[0]
+            # A lane gets points where its height bends, besides those of its line.
+            own, bends = _shares(line), (along / along[-1] - low) / (high - low)
+            shares = np.unique(np.concatenate([own, bends[(bends > 0.0) & (bends < 1.0)]]))
+            x, y = (np.interp(shares, own, line[:, axis]) for axis in (0, 1))
+            z = np.interp((low + (high - low) * shares) * along[-1], along, heights)
+            rows = np.column_stack([x, y, z]).tolist()
+            shape = " ".join(",".join(f"{value:.{PRECISION}f}" for value in row) for row in rows)
             return f'{match[1]}{match[2]}{match[3]}{shape}"'
 
         return _LANE.sub(raised, self.text)
@@ -230,7 +240,7 @@ def _joints(reader: _Reader) -> Iterator[str]:
     for node in reader.shapes:
         across = shapely.union_all([line.buffer((LANE_WIDTH + ARM_GAP) / 2) for line, _ in ends[node]])
         arms = max(len(shapely.get_parts(across)), _directions([heading for _, heading in ends[node]]))
-        if len(neighbours[node]) < MIN_ARMS or (arms < MIN_ARMS and len(ends[node]) <= MAX_MERGING):
+        if arms < MIN_ARMS and (len(neighbours[node]) < MIN_ARMS or len(ends[node]) <= MAX_MERGING):
             yield node
 
 

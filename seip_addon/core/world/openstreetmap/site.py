@@ -540,7 +540,7 @@ def _carriageway(streets: StreetMap, middle: Float, reach: float) -> BaseGeometr
     near = shapely.Point(middle).buffer(reach + SCENE_MARGIN + STANDS_AROUND)
     driving = [lane for lane in road_surface.in_groups(streets.lanes, ["driving"]) if road_surface.is_near(lane, near)]
     junctions = [one.carriageway for one in streets.junctions if one.carriageway.intersects(near)]
-    return road_surface.without_crumbs(united([*(lane.polygon for lane in driving), *junctions]))
+    return road_surface.without_crumbs(united([road_surface.lane_outline(driving), *junctions]))
 
 
 def _roundabouts(road_map: RoadMap, streets: StreetFile, extract: Extract) -> tuple[frozenset[str], ...]:

@@ -137,7 +137,7 @@ class Place:
     def _whole_streets(self, lanes: Sequence[LaneSurface], shift: Float) -> BaseGeometry:
         """Return the area of lanes (local axes) with the opposite carriageways of their streets and whole junctions.
 
-        Links that begin and end there, such as lanes for turning right, and other carriageways of one street, too.
+        So are links that begin and end there, such as lanes for turning right, unless they have another name.
         """
         around = self.within.convex_hull.buffer(SCENE_MARGIN)
         driving = road_surface.in_groups(self.surfaces, ["driving"])
@@ -147,9 +147,9 @@ class Place:
         junctions = [shifted(one.carriageway, -shift) for one in self.junctions if there & one.roads]
         inside = [one for one in junctions if one.intersection(area).area > MIN_SHARE_OF_JUNCTION * one.area]
         whole = closed(united([area, *inside]).simplify(TOLERANCE), JUNCTION_GAP)
-        links = [
-            own for own in road_surface.by_road(nearby).values() if all(leads_between(lane, whole) for lane in own)
-        ]
+        names = {"", *(self._names.get(lane.road_id, "") for lane in lanes)}
+        roads = [own for road, own in road_surface.by_road(nearby).items() if self._names.get(road, "") in names]
+        links = [own for own in roads if all(leads_between(lane, whole) for lane in own)]
         whole = united([whole, *(lane.polygon for own in links for lane in own)])
         # Mitred corners of the closing that lie outside the road are no part of it.
         road = united([*(lane.polygon for lane in nearby), *junctions]).buffer(JUNCTION_GAP / 2)

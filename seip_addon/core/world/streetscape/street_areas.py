@@ -6,6 +6,7 @@ closed, is the carriageway; all other surfaces are what is left of their lanes o
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import shapely
@@ -17,6 +18,7 @@ from ..opendrive.lanes import LaneSurface
 from ..opendrive.road_map import Road
 from .road_surface import (
     CARRIAGEWAY,
+    MAX_SEAM,
     Roadside,
     by_road,
     in_groups,
@@ -83,10 +85,10 @@ class StreetAreas:
     roadside: Roadside
     inside: BaseGeometry
 
-    @property
+    @cached_property
     def whole(self) -> BaseGeometry:
-        """Carriageway and pavements."""
-        return united([self.roadside.carriageway, self.pavement])
+        """Carriageway and pavements, with seams between them closed."""
+        return closed(united([self.roadside.carriageway, self.pavement]), MAX_SEAM)
 
 
 def street_areas(
@@ -137,7 +139,7 @@ def street_areas(
 def _carriageway(strips: Sequence[BaseGeometry], junctions: Sequence[JunctionArea]) -> BaseGeometry:
     """Return the union of strips and junctions, with gaps closed where they meet and small holes filled."""
     # Without corners that are hardly any: mitred buffers make spikes of these.
-    area = united([*strips, *(one.carriageway for one in junctions)]).simplify(TOLERANCE)
+    area = closed(united([*strips, *(one.carriageway for one in junctions)]), MAX_SEAM).simplify(TOLERANCE)
     around = united(one.carriageway.buffer(AROUND_JUNCTION) for one in junctions)
     gaps = without(closed(area, GAP), area).intersection(around)
     whole = without_crumbs(united([area, gaps]), least=MIN_HOLE)

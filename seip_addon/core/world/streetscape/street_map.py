@@ -13,6 +13,7 @@ from ..opendrive.objects import PlacedObject, placed_objects
 from ..opendrive.profile import Profile
 from ..opendrive.road_map import RoadMap
 from ..opendrive.signals import PlacedSignal, placed_signals
+from .road_surface import with_rows_at
 
 ROADS_PER_STEP = 20
 Profiles = Mapping[str, tuple[Float, Float]]
@@ -106,6 +107,7 @@ def _linear(along: Float, heights: Float) -> Profile:
 
 
 def _raised(lane: LaneSurface, along: Float, heights: Float) -> LaneSurface:
+    lane = with_rows_at(lane, along)  # where its height bends
     height = np.interp(lane.s, along, heights)
     left, right = (np.column_stack([edge[:, :2], height]) for edge in (lane.left, lane.right))
     return replace(lane, left=left, right=right)
