@@ -44,6 +44,7 @@ CROSSING_WIDTH = 4.0  # metres: the same of crossings
 CORNER = 2.0  # metres that the carriageway of a junction extends beyond the lanes through it, at most
 BIKE_LANE = 0.75  # half the width of a cycle lane, metres: between lanes through a junction
 MIN_STEP = 1e-3  # metres between points of a line: closer ones are one point
+MIN_LENGTH = 0.1  # metres: shorter lanes within junctions have no direction
 MAX_MITRE = 2.0  # length of a corner's offset in widths, at most
 LAMP_HEIGHT = 5.0  # metres above the road
 RAILS = {"tram", "rail_urban", "rail", "rail_electric", "rail_fast"}
@@ -295,7 +296,7 @@ def _connecting(
         line = np.concatenate(parts)
         line = line[np.concatenate([[True], np.hypot(*np.diff(line[:, :2], axis=0).T) > MIN_STEP])]
         source, target = (reader.lane(f"{one[end]}_{one[f'{end}Lane']}") for end in ("from", "to"))
-        if len(line) > 1 and source.type and target.type:
+        if _length(line) > MIN_LENGTH and source.type and target.type:
             # A cycle lane that leads into a driving lane ends where the junction begins.
             kind = source.type if source.type == target.type else "driving"
             lanes = found.setdefault((first, one["from"], one["to"]), {})
