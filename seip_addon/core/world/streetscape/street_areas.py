@@ -141,7 +141,7 @@ def _carriageway(strips: Sequence[BaseGeometry], junctions: Sequence[JunctionAre
     # Without corners that are hardly any: mitred buffers make spikes of these.
     area = closed(united([*strips, *(one.carriageway for one in junctions)]), MAX_SEAM).simplify(TOLERANCE)
     around = united(one.carriageway.buffer(AROUND_JUNCTION) for one in junctions)
-    gaps = without(closed(area, GAP), area).intersection(around)
+    gaps = without(closed(area, GAP, "round"), area).intersection(around)
     whole = without_crumbs(united([area, gaps]), least=MIN_HOLE)
     holes = [shapely.Polygon(ring) for part in shapely.get_parts(whole) for ring in part.interiors]
     near = around.buffer(AROUND_JUNCTION)
@@ -197,7 +197,7 @@ def _wide(pavement: BaseGeometry) -> BaseGeometry:
 def _at_kerb(mapped: BaseGeometry, carriageway: BaseGeometry) -> BaseGeometry:
     """Return mapped sidewalks, with narrow gaps between them and the carriageway closed."""
     street = united([mapped, carriageway])
-    return united([mapped, without(closed(street, GAP), street).intersection(mapped.buffer(2 * GAP))])
+    return united([mapped, without(closed(street, GAP, "round"), street).intersection(mapped.buffer(2 * GAP))])
 
 
 def _towards(side: Roadside, mapped: BaseGeometry) -> BaseGeometry:
@@ -223,7 +223,8 @@ def _tapers(lanes: Sequence[LaneSurface], roads: Mapping[str, Road], joints: set
     """Yield the tapers where a street gets more lanes or wider ones, along its narrower road."""
     own = by_road([lane for lane in lanes if lane.lane_type])
     paved = {road: [lane for lane in group if lane in in_groups(group, CARRIAGEWAY)] for road, group in own.items()}
-    areas = {road: united(lane.polygon for lane in group) for road, group in paved.items() if group}
+    outside = {road.id for road in roads.values() if road.junction_id is None}
+    areas = {road: united(lane.polygon for lane in group) for road, group in paved.items() if road in outside}
     for road in roads.values():
         if road.junction_id not in joints or road.predecessor is None or road.successor is None:
             continue
@@ -236,11 +237,11 @@ def _tapers(lanes: Sequence[LaneSurface], roads: Mapping[str, Road], joints: set
             jump = float((ends[1][0] - ends[0][0]) @ aside / max(np.hypot(*aside), 1e-9))
             if not MIN_JUMP <= abs(jump) <= MAX_JUMP:
                 continue
-            narrow, row = (before, -1) if jump > 0 else (after, 0)
-            taper = _taper(own[narrow], row, abs(jump), outer=outer)
-            others = united(area for one, area in areas.items() if one not in (before, after, road.id))
-            if not others.dwithin(taper.road.buffer(-0.1), MIN_MEDIAN):
-                yield taper
+            narrow, row, (edge, out), (far, _) = (before, -1, *ends) if jump > 0 else (after, 0, *ends[::-1])
+            # A median to another carriageway stays open.
+            beyond = shapely.LineString([edge + MIN_JUMP * out, edge + (abs(jump) + MIN_MEDIAN) * out])
+            if not any(beyond.intersects(area) for one, area in areas.items() if one not in (before, after)):
+                yield _taper(own[narrow], row, abs(jump), far, outer=outer)
 
 
 def _outermost(lanes: Sequence[LaneSurface], *, outer: bool) -> LaneSurface:
@@ -255,8 +256,8 @@ def _edge_end(lanes: Sequence[LaneSurface], row: int, *, outer: bool) -> tuple[F
     return edge[row, :2], away / max(float(np.hypot(*away)), 1e-9)
 
 
-def _taper(lanes: Sequence[LaneSurface], row: int, jump: float, *, outer: bool) -> _Taper:
-    """Return the taper of a road by ``jump`` metres at its start (0) or end (-1)."""
+def _taper(lanes: Sequence[LaneSurface], row: int, jump: float, far: Float, *, outer: bool) -> _Taper:
+    """Return the taper of a road by ``jump`` metres at its start (0) or end (-1), and on to the wider road at ``far``."""
     lane = _outermost(in_groups(lanes, CARRIAGEWAY), outer=outer)
     whole = float(lane.s[-1] - lane.s[0])
     length = min(RATE * jump, MAX_SHARE * whole)
@@ -266,6 +267,9 @@ def _taper(lanes: Sequence[LaneSurface], row: int, jump: float, *, outer: bool) 
     aside /= np.maximum(np.hypot(*aside.T), 1e-9)[:, None]
     by = jump * np.clip(1.0 - np.abs(lane.s - lane.s[row]) / length, 0.0, 1.0)[:, None]
     widened = edge[:, :2] + by * aside
+    # Through the joint the widened edge leads straight to that of the wider road.
+    at = len(widened) if row else 0
+    widened, aside = np.insert(widened, at, far, axis=0), np.insert(aside, at, aside[row], axis=0)
     walked = [one for one in in_groups(lanes, ["sidewalk"]) if outer]
     width = max((float(np.hypot(*(one.left - one.right)[row, :2])) for one in walked), default=0.0)
     beyond = shapely.Polygon([*widened, *(widened + width * aside)[::-1]]) if width else shapely.Polygon()
