@@ -41,6 +41,7 @@ ARM_GAP = 2.0  # metres between two ends of carriageways of one arm at most
 MAX_MERGING = 4  # ends of edges where the directions of one street divide: two of each direction
 LANE_WIDTH = 3.2  # metres: SUMO's width of lanes without one
 CROSSING_WIDTH = 4.0  # metres: the same of crossings
+SLIVER = 0.3  # metres: parts of a junction up to twice this wide between its pavements are no carriageway
 CORNER = 2.0  # metres that the carriageway of a junction extends beyond the lanes through it, at most
 BIKE_LANE = 0.75  # half the width of a cycle lane, metres: between lanes through a junction
 MIN_STEP = 1e-3  # metres between points of a line: closer ones are one point
@@ -75,9 +76,10 @@ class _Edge:
 class _Reader:
     """Handler of a stream of XML that collects the elements of a network."""
 
-    def __init__(self) -> None:
+    def __init__(self, name: str) -> None:
+        self.name = name
         self.left_hand = False
-        self.location: Attributes = {}
+        self.offset, self.projection = np.zeros(2), ""
         self.edges: dict[str, _Edge] = {}
         self.shapes: dict[str, Float] = {}
         self.connections: list[Attributes] = []
@@ -89,11 +91,22 @@ class _Reader:
         return self.edges[edge].lanes[int(index)]
 
     def read_element(self, tag: str, given: Attributes) -> None:
-        """Read an element."""
+        """Read an element; an error names the file."""
+        try:
+            self._read(tag, given)
+        except (KeyError, ValueError) as error:
+            raise self.invalid(error) from error
+
+    def invalid(self, error: Exception) -> SeipError:
+        """Return the error of an invalid network."""
+        return SeipError(f"{self.name} is not a valid SUMO network ({error}); write it again with netconvert")
+
+    def _read(self, tag: str, given: Attributes) -> None:
         if tag == "net":
             self.left_hand = given.get("lefthand") == "true"
         elif tag == "location":
-            self.location = given
+            self.offset = np.array(given["netOffset"].split(","), dtype=np.float64)
+            self.projection = given["projParameter"]
         elif tag == "edge":
             self._current = given["id"]
             function, begin, end, name = (given.get(key, "") for key in ("function", "from", "to", "name"))
@@ -174,28 +187,30 @@ def read_network(path: Path) -> Network:
     SeipError
         The file cannot be read or is not a network.
     """
-    reader = _Reader()
+    reader = _Reader(path.name)
     try:
         finish(read_tags(path, reader.read_element))
-        joints = frozenset(_joints(reader))
         pieces = {f"{edge.id}_{index}": (edge.id, 0.0, 1.0) for edge in reader.edges.values() for index in edge.lanes}
-        roads = list(_roads(reader, pieces))
-    except (KeyError, ValueError) as error:
-        raise SeipError(f"{path.name} is not a valid SUMO network ({error}); write it again with netconvert") from error
-    if not roads:
-        raise SeipError(f"{path.name} has no streets")
-    offset = np.array(reader.location["netOffset"].split(","), dtype=np.float64)
+        streets = _streets(reader, pieces)
+    except KeyError as error:
+        raise reader.invalid(error) from error
+    if not streets.lanes:
+        raise SeipError(f"{path.name} is a SUMO network without streets; write it again with netconvert")
+    return Network(streets, path.read_text(encoding="utf-8"), pieces)
+
+
+def _streets(reader: _Reader, pieces: dict[str, tuple[str, float, float]]) -> StreetMap:
+    roads = list(_roads(reader, pieces))
     road_map = RoadMap(
         name="",
-        header_offset=np.array([*-offset, 0.0, 0.0]),
-        geo_reference=reader.location["projParameter"],
+        header_offset=np.array([*-reader.offset, 0.0, 0.0]),
+        geo_reference=reader.projection,
         roads=tuple(road for road, _ in roads),
         junctions=tuple(Junction(number, number) for number in reader.shapes),
     )
     lanes = tuple(itertools.chain.from_iterable(lanes for _, lanes in roads))
-    areas = tuple(_junction_areas(reader, lanes, joints))
-    streets = StreetMap(road_map, lanes, tuple(_crossings(reader)), tuple(_signals(reader)), areas)
-    return Network(streets, path.read_text(encoding="utf-8"), pieces)
+    areas = tuple(_junction_areas(reader, lanes, frozenset(_joints(reader))))
+    return StreetMap(road_map, lanes, tuple(_crossings(reader)), tuple(_signals(reader)), areas)
 
 
 def _points(shape: str) -> Float:
@@ -203,7 +218,8 @@ def _points(shape: str) -> Float:
     rows = [[float(value) for value in point.split(",")] for point in shape.split()]
     points: Float = np.array([(*row, 0.0)[:3] for row in rows])
     steps = np.hypot(*np.diff(points[:, :2], axis=0).T)
-    return points[np.concatenate([[True], steps > MIN_STEP])]
+    apart: Float = points[np.concatenate([[True], steps > MIN_STEP])]
+    return apart
 
 
 def _type(given: Attributes) -> str:
@@ -406,6 +422,8 @@ def _driven_area(area: BaseGeometry, lanes: BaseGeometry) -> BaseGeometry:
     Pavements of edges shorter than the junction reach into it, and some between wide angles lie beyond it: the
     carriageway is where vehicles drive, and a little more at corners where none turns.
     """
+    # Morphological opening: where a pavement does not quite reach the outline of the junction, slivers are left.
+    area = area.buffer(-SLIVER, join_style="mitre").buffer(SLIVER, join_style="mitre")
     if lanes.is_empty:
         return area
     filled = united(shapely.Polygon(part.exterior) for part in shapely.get_parts(closed(lanes, BIKE_LANE)))

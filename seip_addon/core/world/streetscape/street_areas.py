@@ -257,7 +257,7 @@ def _edge_end(lanes: Sequence[LaneSurface], row: int, *, outer: bool) -> tuple[F
 
 
 def _taper(lanes: Sequence[LaneSurface], row: int, jump: float, far: Float, *, outer: bool) -> _Taper:
-    """Return the taper of a road by ``jump`` metres at its start (0) or end (-1), and on to the wider road at ``far``."""
+    """Return the taper of a road by ``jump`` metres at its start (0) or end (-1), and on to the wider one at ``far``."""
     lane = _outermost(in_groups(lanes, CARRIAGEWAY), outer=outer)
     whole = float(lane.s[-1] - lane.s[0])
     length = min(RATE * jump, MAX_SHARE * whole)
