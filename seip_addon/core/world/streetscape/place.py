@@ -30,7 +30,7 @@ from .intersections import (
 from .levels import Levels, split_levels
 from .named_places import street_names
 from .street_areas import GAP as JUNCTION_GAP
-from .street_areas import MIN_ISLAND_AREA, TOLERANCE
+from .street_areas import MIN_ISLAND_AREA, TOLERANCE, tapers
 from .street_map import JunctionArea
 
 MIN_SHARE_OF_JUNCTION = 0.5  # share of a junction's area in a region from which on the region includes all of it
@@ -144,15 +144,18 @@ class Place:
         nearby = road_surface.local_strips(driving, shift, shifted(around, -shift))
         area = with_other_carriageways(lanes, nearby, self._names)
         there = {lane.road_id for lane in nearby}
-        junctions = [shifted(one.carriageway, -shift) for one in self.junctions if there & one.roads]
+        joined = [one for one in self.junctions if there & one.roads]
+        junctions = [shifted(one.carriageway, -shift) for one in joined]
+        widened = [one.road for one in tapers(nearby, joined, {road.id: road for road in self.road_map.roads})]
         inside = [one for one in junctions if one.intersection(area).area > MIN_SHARE_OF_JUNCTION * one.area]
         whole = closed(united([area, *inside]).simplify(TOLERANCE), JUNCTION_GAP)
         names = {"", *(self._names.get(lane.road_id, "") for lane in lanes)}
         roads = [own for road, own in road_surface.by_road(nearby).items() if self._names.get(road, "") in names]
         links = [own for own in roads if all(leads_between(lane, whole) for lane in own)]
         whole = united([whole, *(lane.polygon for own in links for lane in own)])
+        whole = united([whole, *(one for one in widened if one.intersection(whole.buffer(JUNCTION_GAP)).length > 0)])
         # Mitred corners of the closing that lie outside the road are no part of it.
-        road = united([*(lane.polygon for lane in nearby), *junctions]).buffer(JUNCTION_GAP / 2)
+        road = united([*(lane.polygon for lane in nearby), *junctions, *widened]).buffer(JUNCTION_GAP / 2)
         whole = closed(whole.simplify(TOLERANCE), JUNCTION_GAP).intersection(road)
         return road_surface.without_crumbs(whole, least=MIN_ISLAND_AREA)
 

@@ -4,7 +4,8 @@ A network has lanes as strips that end where a junction begins, and junctions as
 closed, is the carriageway; all other surfaces are what is left of their lanes outside it.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -115,15 +116,15 @@ def street_areas(
     """
     there = {lane.road_id for lane in lanes}
     junctions = [one for one in junctions if there & one.roads]
-    tapers = list(_tapers(lanes, roads, {one.id for one in junctions if one.is_joint}))
+    widened = list(tapers(lanes, junctions, roads))
     strips = {
         group: united(lane.polygon for lane in in_groups(lanes, [group]) if lane.junction_id is None)
         for group in CARRIAGEWAY
     }
-    carriageway = _carriageway([*strips.values(), *(one.road for one in tapers)], junctions)
+    carriageway = _carriageway([*strips.values(), *(one.road for one in widened)], junctions)
     inside = united(one.carriageway for one in junctions if not one.is_joint)
     side = roadside(lanes, carriageway)
-    walked = _walked(lanes, junctions, tapers, carriageway)
+    walked = _walked(lanes, junctions, widened, carriageway)
     # A mapped line within the carriageway says no more than that the pavement is narrow: the assumed one stays there.
     lines = united(shapely.LineString(one.line) for one in sidewalks)
     lines = without(lines, carriageway.buffer(GAP))
@@ -172,13 +173,13 @@ def _groups(
 def _walked(
     lanes: Sequence[LaneSurface],
     junctions: Sequence[JunctionArea],
-    tapers: Sequence["_Taper"],
+    widened: Sequence["_Taper"],
     carriageway: BaseGeometry,
 ) -> BaseGeometry:
     """Return the pavements along the lanes and, in junctions, along the carriageway."""
     corners = united(one.walking for one in junctions).intersection(carriageway.buffer(PAVEMENT_WIDTH))
     strips = [lane.polygon for lane in in_groups(lanes, ["sidewalk"])]
-    return united([*strips, corners, *(one.pavement for one in tapers)])
+    return united([*strips, corners, *(one.pavement for one in widened)])
 
 
 def _filled(pavement: BaseGeometry, carriageway: BaseGeometry) -> BaseGeometry:
@@ -219,17 +220,21 @@ class _Taper:
     pavement: BaseGeometry
 
 
-def _tapers(lanes: Sequence[LaneSurface], roads: Mapping[str, Road], joints: set[str]) -> Iterator[_Taper]:
-    """Yield the tapers where a street gets more lanes or wider ones, along its narrower road."""
+def tapers(
+    lanes: Sequence[LaneSurface], junctions: Iterable[JunctionArea], roads: Mapping[str, Road]
+) -> Iterator[_Taper]:
+    """Yield the tapers where a street gets more lanes or wider ones, along its narrower road; see `street_areas`."""
+    joints = {one.id for one in junctions if one.is_joint}
+    through = [road for road in roads.values() if road.junction_id in joints and road.predecessor and road.successor]
+    pairs = [(road.predecessor.id, road.successor.id) for road in through if road.predecessor and road.successor]
+    # A slip road that leaves or joins a street is no other part of it.
+    starts, stops = (Counter(ends) for ends in zip(*pairs, strict=True)) if pairs else (Counter[str](), Counter[str]())
     own = by_road([lane for lane in lanes if lane.lane_type])
     paved = {road: [lane for lane in group if lane in in_groups(group, CARRIAGEWAY)] for road, group in own.items()}
     outside = {road.id for road in roads.values() if road.junction_id is None}
     areas = {road: united(lane.polygon for lane in group) for road, group in paved.items() if road in outside}
-    for road in roads.values():
-        if road.junction_id not in joints or road.predecessor is None or road.successor is None:
-            continue
-        before, after = road.predecessor.id, road.successor.id
-        if not paved.get(before) or not paved.get(after):
+    for before, after in pairs:
+        if not paved.get(before) or not paved.get(after) or starts[before] > 1 or stops[after] > 1:
             continue
         for outer in (True, False):
             ends = _edge_end(paved[before], -1, outer=outer), _edge_end(paved[after], 0, outer=outer)
@@ -257,7 +262,7 @@ def _edge_end(lanes: Sequence[LaneSurface], row: int, *, outer: bool) -> tuple[F
 
 
 def _taper(lanes: Sequence[LaneSurface], row: int, jump: float, far: Float, *, outer: bool) -> _Taper:
-    """Return the taper of a road by ``jump`` metres at its start (0) or end (-1), and on to the wider one at ``far``."""
+    """Return the taper of a road by ``jump`` metres at its start (0) or end (-1), and on to the wider at ``far``."""
     lane = _outermost(in_groups(lanes, CARRIAGEWAY), outer=outer)
     whole = float(lane.s[-1] - lane.s[0])
     length = min(RATE * jump, MAX_SHARE * whole)
