@@ -52,7 +52,7 @@ from .road_surface import Roadside, SurfaceLayers, without_crumbs
 from .roofs import house
 from .signal_posts import signal_parts, split_posts
 from .street_areas import MAX_MAPPED, NOTHING, Sidewalk, StreetAreas, street_areas
-from .street_map import JunctionArea, StreetMap, opendrive_streets
+from .street_map import JunctionArea, StreetMap
 from .terrain import Embankments, FlatLand, Relief, Terrain, cut, embankment_width
 
 STEPS = ("place", "ground", "objects", "carriageway", "pavements", "verge", "checks")
@@ -206,18 +206,6 @@ class _Surroundings:
         """Driving lanes without a strip along their edges, where posts count as standing next to the road."""
         driving = road_surface.lane_outline(road_surface.in_groups(self.lanes, ["driving"]))
         return driving.buffer(-MAX_IN_LANE)
-
-
-def site_model(road_map: RoadMap, description: SiteDescription) -> Generator[Progress, None, SiteModel]:
-    """Model a place of an OpenDRIVE map; see `street_model`.
-
-    Yields
-    ------
-    Progress
-        Number of roads converted to lanes, then the steps of `street_model`.
-    """
-    streets = yield from opendrive_streets(road_map)
-    return (yield from street_model(streets, description))
 
 
 def street_model(streets: StreetMap, description: SiteDescription) -> Generator[Progress, None, SiteModel]:

@@ -13,8 +13,8 @@ from seip_addon.core.workflows.site_building import SiteRequest, build_site
 from seip_addon.core.world.opendrive.lanes import LaneSurface
 from seip_addon.core.world.opendrive.read import read_map
 from seip_addon.core.world.streetscape.description import SiteDescription
-from seip_addon.core.world.streetscape.model import site_model
 from seip_addon.core.world.streetscape.road_surface import roadside, without_gaps
+from tests.builders.map_models import site_model
 from tests.builders.osm_text import Extract
 from tests.builders.street_map import street_map
 from tests.oracles.face_areas import check_surfaces, plan
