@@ -19,6 +19,7 @@ from ..opendrive.road_map import Road
 
 SAME_DIRECTION = math.radians(40.0)  # roads whose ends differ by less lead the same way
 TOUCH = 0.5  # metres between a junction and the end of a road that meets it at most
+JOINT = 1.0  # metres: gaps up to twice this between the lanes of a ring are closed
 JUNCTION_REACH = 20.0  # metres between two junctions of one intersection at most
 PARALLEL = math.radians(15.0)  # largest angle between the carriageways of a street
 MAX_MEDIAN = 22.0  # metres between the middles of lanes of two carriageways of one street at most
@@ -66,20 +67,20 @@ def intersection(
 
 
 def ring_roads(
-    roads: Iterable[Road], junctions: frozenset[str], roundabouts: Iterable[frozenset[str]]
+    roads: Iterable[Road], roundabouts: Iterable[frozenset[str]], junctions: frozenset[str] | None = None
 ) -> frozenset[str]:
-    """Return the ids of the roads that form the rings of the roundabouts of an intersection.
+    """Return the ids of the roads that form the rings of roundabouts.
 
     Parameters
     ----------
     roads : iterable of Road
         Roads of the map.
-    junctions : frozenset of str
-        Ids of the junctions of the intersection.
     roundabouts : iterable of frozenset of str
         Junction ids of each roundabout.
+    junctions : frozenset of str, optional
+        Junctions of an intersection; roundabouts without any of these do not count.
     """
-    rings = [one for one in roundabouts if one & junctions]
+    rings = [one for one in roundabouts if junctions is None or one & junctions]
 
     def in_ring(road: Road, ring: frozenset[str]) -> bool:
         # Part of the ring: within one of its junctions, or between two of them.
@@ -87,6 +88,16 @@ def ring_roads(
         return road.junction_id in ring or all(end is not None and end.id in ring for end in ends)
 
     return frozenset(road.id for road in roads if any(in_ring(road, ring) for ring in rings))
+
+
+def enclosed(ring: Iterable[BaseGeometry]) -> BaseGeometry:
+    """Return what the areas of the lanes of a ring enclose."""
+    area = closed(united(ring), JOINT)
+    return united(shapely.Polygon(hole) for part in _polygons(area) for hole in part.interiors)
+
+
+def _polygons(area: BaseGeometry) -> list[shapely.Polygon]:
+    return [part for part in shapely.get_parts(area) if part.geom_type == "Polygon"]
 
 
 def with_other_carriageways(

@@ -22,12 +22,12 @@ from ...site.scene_geometry import ASSUMED, DESCRIBED, OTHER_LEVELS, NamedArea
 from ...site.sources import SourceCount, count_sources
 from ..opendrive.lanes import LaneSurface
 from ..opendrive.objects import PlacedObject, extent_in_plan
-from ..opendrive.road_map import Road, RoadMap
 from ..opendrive.signals import PlacedSignal
 from . import road_surface, street_furniture
 from .clearing import MAX_IN_LANE, clear
 from .description import MAX_COVERED, Building, PlacedSolid, Poles, SideWay, SiteDescription, Slab, Trees, Wall
 from .geographic_position import in_metres
+from .intersections import enclosed, ring_roads
 from .levels import MIN_LEVEL_HEIGHT, Levels
 from .map_furniture import (
     CROWN_SHARE,
@@ -176,7 +176,7 @@ class _Surroundings:
     areas : StreetAreas or None
         Areas of the street in a network; in OpenDRIVE the surfaces are those of the lanes.
     built_up : shapely geometry
-        Area of the buildings next to a network, where no post stands.
+        Buildings next to a network and islands of its roundabouts, where no pavement is assumed.
     terrain : Terrain
         Heights of the studied roads, and of the ground next to them.
     ground : Terrain
@@ -289,7 +289,7 @@ def street_model(streets: StreetMap, description: SiteDescription) -> Generator[
             objects,
             street.region,
             unnamed=UNNAMED_STREET if description.from_centre_lines else "",
-            rings=_ring_roads(road_map, description.roundabouts),
+            rings=ring_roads(road_map.roads, description.roundabouts),
         ),
         attribution=tuple(dict.fromkeys((*road_map.attribution, *description.attribution))),
     )
@@ -386,16 +386,6 @@ def _overlay_parts(
         *_area_parts(described, street),
         *_keep_off_parts(described, objects, street),
     ]
-
-
-def _ring_roads(road_map: RoadMap, roundabouts: Sequence[frozenset[str]]) -> frozenset[str]:
-    """Return the ids of the roads between two junctions of one roundabout."""
-
-    def is_ring(road: Road) -> bool:
-        ends = {link.id for link in (road.predecessor, road.successor) if link is not None and link.kind == "junction"}
-        return len(ends) == 2 and any(ends <= one for one in roundabouts)
-
-    return frozenset(road.id for road in road_map.roads if road.junction_id is None and is_ring(road))
 
 
 def _sight_area(region: BaseGeometry, parts: Sequence[Part]) -> BaseGeometry:
@@ -573,7 +563,9 @@ def _surroundings(
     areas, houses = None, NOTHING
     if streets.junctions:
         outlines = [one.outline for one in description.buildings] + [one.outline for one in description.solids]
-        houses = united(shifted(one, -origin) for one in outlines)
+        rings = ring_roads(streets.road_map.roads, description.roundabouts)
+        islands = enclosed([lane.polygon for lane in lanes if lane.road_id in rings])
+        houses = united([islands, *(shifted(one, -origin) for one in outlines)])
         sidewalks = [Sidewalk(one.line - origin[:2], one.width) for one in description.ways if one.line is not None]
         junctions = (_local_junction(one, origin) for one in streets.junctions)
         near = [one for one in junctions if extent.intersects(one.carriageway)]

@@ -229,7 +229,7 @@ class Place:
         """Return the smallest rectangle around a junction's driving lanes, aligned with its roads if possible."""
         if self.description.from_centre_lines:
             driving = road_surface.in_groups(self.surfaces, ["driving"])
-            ring = ring_roads(self.road_map.roads, self._one_place(junction), self.description.roundabouts)
+            ring = ring_roads(self.road_map.roads, self.description.roundabouts, self._one_place(junction))
             around = [shapely.make_valid(lane.polygon) for lane in driving if lane.road_id in ring]
             return box_along(shapely.union_all([self._driving_area(junction), *around]), driving)
         return shapely.minimum_rotated_rectangle(self._driving_area(junction))
