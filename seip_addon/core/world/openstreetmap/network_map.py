@@ -123,7 +123,7 @@ class _Reader:
 
 
 @dataclass(frozen=True, eq=False)
-class Network:
+class NetworkMap:
     """A network of SUMO: its streets, and the file that traffic is simulated on.
 
     Parameters
@@ -170,7 +170,7 @@ def credited(text: str, attribution: Iterable[str]) -> str:
     return f"{head}{lines}{mark}{rest}"
 
 
-def read_network(path: Path) -> Network:
+def read_network_map(path: Path) -> NetworkMap:
     """Read a network of SUMO.
 
     Each edge is a road, and so is each group of parallel connections within a junction. Lane ids, edges and links are
@@ -196,7 +196,7 @@ def read_network(path: Path) -> Network:
         raise reader.invalid(error) from error
     if not streets.lanes:
         raise SeipError(f"{path.name} is a SUMO network without streets; write it again with netconvert")
-    return Network(streets, path.read_text(encoding="utf-8"), pieces)
+    return NetworkMap(streets, path.read_text(encoding="utf-8"), pieces)
 
 
 def _streets(reader: _Reader, pieces: dict[str, tuple[str, float, float]]) -> StreetMap:

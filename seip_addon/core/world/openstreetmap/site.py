@@ -34,7 +34,7 @@ from .extract import EARTH_RADIUS, MAX_LATITUDE, Extract, Node, Way, cropped, re
 from .heights import StreetHeights, has_heights, street_heights
 from .mapped_crossings import guessed_crossings, with_mapped_crossings
 from .netconvert import convert
-from .network_map import Network, read_network
+from .network_map import NetworkMap, read_network_map
 from .plan_shapes import PlanShapes
 from .signals import SIGNAL_REACH
 from .street_objects import surroundings
@@ -118,7 +118,7 @@ class ExtractSite:
     ----------
     streets : StreetMap
         Streets as netconvert lays them out, with the crossings of the extract: flat, unless the extract has heights.
-    network : Network
+    network : NetworkMap
         Network of these streets.
     text : str
         Text of the network, on which traffic is simulated.
@@ -135,7 +135,7 @@ class ExtractSite:
     """
 
     streets: StreetMap
-    network: Network
+    network: NetworkMap
     text: str
     description: SiteDescription
     notes: tuple[str, ...]
@@ -264,7 +264,7 @@ def _extract_around(
 
 def _network(
     extract: Extract, near: tuple[float, float], place: ExtractPlace, map_path: Path, sumo: Iterable[Path]
-) -> Generator[Progress, None, tuple[StreetFile, Network]]:
+) -> Generator[Progress, None, tuple[StreetFile, NetworkMap]]:
     """Write the streets around a place, and return them with the network that netconvert makes of them."""
     reach = place.reach + STREET_REACH
     streets_path = map_path.with_name(f"{map_path.name}.streets.osm")
@@ -277,7 +277,7 @@ def _network(
         yield from convert(source, streets_path, map_path, sumo)
     finally:
         streets_path.unlink(missing_ok=True)
-    return source, read_network(map_path)
+    return source, read_network_map(map_path)
 
 
 @dataclass(frozen=True, eq=False)

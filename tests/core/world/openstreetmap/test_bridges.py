@@ -12,7 +12,7 @@ from seip_addon.core.progress import finish
 from seip_addon.core.site.scene_geometry import OTHER_LEVELS
 from seip_addon.core.workflows.site_building import SiteRequest, build_site
 from seip_addon.core.world.elevation.at_place import TerrainRequest
-from seip_addon.core.world.openstreetmap.network_map import read_network
+from seip_addon.core.world.openstreetmap.network_map import read_network_map
 from tests.builders.dem_files import origin_at, sampled, write_dem
 from tests.builders.osm_text import Extract
 from tests.sumo_here import needs_sumo
@@ -30,7 +30,7 @@ def built(extract, tmp_path, **asked):
     asked = {"near_latlon": (extract.latitude, extract.longitude), "radius": 90.0} | asked
     site = finish(build_site(path, SiteRequest(**asked)))
     (tmp_path / "place.net.xml").write_text(site.map_text, encoding="utf-8")
-    return site, read_network(tmp_path / "place.net.xml").streets
+    return site, read_network_map(tmp_path / "place.net.xml").streets
 
 
 def lanes_of(streets, name=None):

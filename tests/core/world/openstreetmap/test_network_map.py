@@ -5,7 +5,7 @@ import pytest
 import shapely
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.world.openstreetmap.network_map import credited, read_network
+from seip_addon.core.world.openstreetmap.network_map import credited, read_network_map
 
 NETWORK = """<net version="1.20"{left}>
 <location netOffset="-391000.00,-5817000.00" convBoundary="0,0,1,1" origBoundary="0,0,1,1" projParameter="+proj=utm"/>
@@ -37,7 +37,7 @@ SIDE_STREET = '<edge id="4" from="d" to="b"><lane id="4_0" index="0" disallow="t
 def read(tmp_path, *, left="", more=""):
     path = tmp_path / "place.net.xml"
     path.write_text(NETWORK.format(left=left, more=more), encoding="utf-8")
-    return read_network(path)
+    return read_network_map(path)
 
 
 def lanes(network, road):
@@ -104,7 +104,7 @@ def test_raised_streets_and_their_file_agree(tmp_path):
     assert np.interp([40.0, 69.0], lane.s, lane.left[:, 2]) == pytest.approx([2.0, 2.5])
     path = tmp_path / "raised.net.xml"
     path.write_text(network.raised_text(profiles), encoding="utf-8")
-    again = {one.road_id: one for one in read_network(path).streets.lanes if one.lane_type == "driving"}
+    again = {one.road_id: one for one in read_network_map(path).streets.lanes if one.lane_type == "driving"}
     assert np.interp([40.0, 69.0], again["2"].s, again["2"].right[:, 2]) == pytest.approx([2.0, 2.5])
     assert again[":b_1"].left[[0, -1], 2] == pytest.approx([3.0, 4.0])
     assert not again["3"].left[:, 2].any()
@@ -114,7 +114,7 @@ def test_credits_are_comments_that_xml_allows(tmp_path):
     path = tmp_path / "credited.net.xml"
     path.write_text(credited(NETWORK.format(left="", more=""), ["© mappers -- 2026"]), encoding="utf-8")
     assert "<!-- © mappers - 2026 -->" in path.read_text(encoding="utf-8")
-    assert read_network(path).streets.lanes
+    assert read_network_map(path).streets.lanes
 
 
 @pytest.mark.parametrize(
@@ -129,4 +129,4 @@ def test_a_damaged_network_is_refused_in_a_sentence(tmp_path, old, new, complain
     path = tmp_path / "place.net.xml"
     path.write_text(NETWORK.format(left="", more="").replace(old, new), encoding="utf-8")
     with pytest.raises(SeipError, match=complaint):
-        read_network(path)
+        read_network_map(path)
