@@ -19,7 +19,7 @@ if not __package__:  # run as a file by `blender -P`
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from headless import runtime, survey
-from headless.charts.pose_errors import save_evaluation_charts
+from headless.charts.robustness import save_evaluation_charts
 from headless.options import add_settings, new_parser, read_settings, real_number
 
 import bpy

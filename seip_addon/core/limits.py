@@ -159,9 +159,6 @@ WEIGHT = Limits(0.0, 1e6)
 CHOSEN_WEIGHT = Limits(1e-6, 1e6)
 """Weight that a user gives to a region: above zero."""
 
-TOTAL_WEIGHT = Limits(0.0, 1e15)
-"""Sum of the weights of targets, or their weight times seconds."""
-
 SHARE = Limits(0.0, 1.0)
 COUNT = Limits(0, 1e12)
 DEGREES = Limits(-360.0, 360.0, "degrees")
@@ -171,13 +168,10 @@ UNWRAPPED_ANGLE = Limits(-1e5, 1e5, "rad")
 """Heading with whole turns."""
 
 TIME = Limits(-1e11, 1e11, "s")
-DURATION = Limits(0.0, 30.0 * 86400.0, "s")
-"""Length of a simulation or recording: 30 days."""
 
 TIME_STEP = Limits(0.001, 86400.0, "s")
 """Time from frame to frame."""
 
-DELAY = Limits(-1e3, 1e3, "s")
 SPEED = Limits(-1e3, 1e3, "m/s")
 FRAMES = Limits(1, 1_000_000)
 """Frames of a recording or of the test of a detector."""
@@ -190,8 +184,6 @@ DRAWS = Limits(1, 100_000)
 
 SENSORS = Limits(1, 100_000)
 SEED = Limits(0, 2**63 - 1)
-EFFORT = Limits(0.0, 1e15)
-"""Limit of a search, in counted work or seconds."""
 
 LIDAR_RANGE = Limits(0.0, 10_000.0, "m")
 """Distance of a return from its sensor."""

@@ -116,5 +116,5 @@ def make_solution(example: Example, goal: Objective, **found) -> Solution:
     value = float(np.count_nonzero(deployment.seen_by))
     values = {"objective": value, "bound": value, "status": "optimal", **found}
     values.setdefault("gap", relative_gap(values["objective"], values["bound"]))
-    placement = Placement(chosen=chosen, solver="HiGHS", seconds=0.5, covered=value, price=deployment.price, **values)
+    placement = Placement(chosen=chosen, solver="HiGHS", price=deployment.price, **values)
     return Solution(goal, placement, None, deployment)

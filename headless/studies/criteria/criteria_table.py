@@ -23,7 +23,6 @@ from headless.studies.detection.sensor_configuration import SensorConfiguration
 import numpy as np
 
 from seip_addon.core.arrays import Float, Integer, Text
-from seip_addon.core.choosing.placement.deployment import deploy
 from seip_addon.core.errors import SeipError
 from seip_addon.core.estimates import IntervalEstimate
 from seip_addon.core.progress import Progress
@@ -142,7 +141,7 @@ def choose_placements(
         configurations = tuple(
             SensorConfiguration(
                 f"{kind} {number}",
-                deploy(survey.site, survey.models, survey.grid.rows(poses), poses),
+                survey.deploy(poses),
                 next(iter(survey.models)),
                 count,
                 kind,

@@ -13,12 +13,9 @@ from seip_addon.core.choosing.placement.objective import Objective, placement_pr
 from seip_addon.core.choosing.placement.problem import PlacementProblem
 from seip_addon.core.choosing.placement.solver import solve
 from seip_addon.core.progress import Progress, within
-from seip_addon.core.sensing.returns.occlusion import returns_in_traffic
-from seip_addon.core.sensing.returns.returns_grid import stored_returns
-from seip_addon.core.sensing.returns.road_users import road_users
 from seip_addon.core.sensing.scans.scanner import ReflectiveSurface
 from seip_addon.core.sensing.visibility.ray_casting import make_ray_caster
-from seip_addon.core.workflows.returns import user_weights
+from seip_addon.core.workflows.returns import survey_returns
 from seip_addon.core.workflows.survey import Survey
 
 from .occupancy import vehicle_occupancy
@@ -61,14 +58,12 @@ def site_criteria(
     Those of the literature go by channels, and are left out for rosettes.
     """
     site, visible = survey.site, survey.grid.visible
-    users = road_users(survey.geometry)
-    grid = yield from stored_returns(survey.returns_path, site, users, survey.models, survey.settings.engine, 1)
-    returns = returns_in_traffic(grid.returns, site.candidates.xyz, users)
+    returns = yield from survey_returns(survey, Objective(), threads=1)
     often = vehicle_occupancy(site.targets, runs)
     literature = () if not set(keys) & set(OF_LITERATURE) else (yield from _of_literature(survey, runs))
     criteria = (
         SeenShare("coverage", "coverage", visible, np.ones(len(site.targets))),
-        LogReturns(returns, user_weights(users, Objective())),
+        LogReturns(returns.in_traffic(), returns.weights),
         SeenShare("occupancy_entropy", "S-MIG", visible, entropy(often)),
         *literature,
     )

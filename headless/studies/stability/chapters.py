@@ -3,23 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Generator, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
-from headless.charts import pose_errors as pose_error_charts
-from headless.charts import traffic as traffic_charts
+from headless.charts import robustness as robustness_charts
 
-from seip_addon.core.choosing.placement.deployment import deploy
 from seip_addon.core.choosing.placement.objective import DEFAULT_COUNT, Objective, placement_problem
 from seip_addon.core.choosing.placement.problem import PlacementProblem
 from seip_addon.core.choosing.placement.risk import Risk
 from seip_addon.core.choosing.placement.scenarios import Scenarios
 from seip_addon.core.choosing.placement.solver import solve
-from seip_addon.core.choosing.robustness.pose_study import PoseStudySettings, pose_study
-from seip_addon.core.choosing.robustness.robust_study import RobustStudy, robust_placements, robust_study
-from seip_addon.core.choosing.robustness.traffic_study import traffic_placements, traffic_scenarios, traffic_study
+from seip_addon.core.choosing.robustness.comparison import Comparison
+from seip_addon.core.choosing.robustness.pose_study import pose_study
+from seip_addon.core.choosing.robustness.robust_problem import RobustProblem
 from seip_addon.core.progress import Progress
-from seip_addon.core.sensing.scenarios.traffic_instants import spread_instants
 from seip_addon.core.sensing.traffic.trajectories import Trajectories
 from seip_addon.core.workflows.survey import Survey, surroundings
 from seip_addon.core.workflows.traffic_runs import split_runs
@@ -51,15 +48,17 @@ class StabilityScope:
         Number of random grids of targets, and of random azimuths.
     rays : int
         Number of rays compared with float64 on each scene.
-    instants : tuple of int
-        Numbers of instants of traffic for optimisation and for evaluation.
+    draws : (int, int)
+        Number of draws of the study of pose errors, with all kinds of errors and with each single kind.
+    robust, traffic : Scenarios
+        Scenarios of robust placements.
     """
 
     grids: int = 40
     rays: int = 20_000
-    poses: PoseStudySettings = field(default_factory=PoseStudySettings)
+    draws: tuple[int, int] = (500, 100)
     robust: Scenarios = Scenarios("pose-errors")
-    instants: tuple[int, int] = (24, 120)
+    traffic: Scenarios = Scenarios("traffic")
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,14 +158,13 @@ def arithmetic(scene: StudiedScene) -> Generator[Progress, None, Chapter]:
 
 def poses(scene: StudiedScene) -> Generator[Progress, None, Chapter]:
     """Study a placement under pose errors."""
-    survey, around = scene.survey, surroundings(scene.survey)
+    survey, errors = scene.survey, scene.scope.robust.pose_errors
     study = yield from _robust(scene, TAIL_RISKS)
-    chosen = study.nominal[0].placement.chosen
-    deployment = deploy(survey.site, survey.models, survey.grid.rows(chosen), chosen)
-    under_errors = yield from pose_study(around, deployment, scene.scope.poses)
-    pose_error_charts.save_spread_chart(scene.charts / "spread.png", study, f"{scene.placed} under pose errors")
-    pose_error_charts.save_loss_chart(scene.charts / "blame.png", under_errors, f"{scene.placed}: what costs coverage")
-    pose_error_charts.save_frontier_chart(
+    deployment = survey.deploy(study[0].nominal.placement.chosen)
+    under_errors = yield from pose_study(surroundings(survey), deployment, errors, 0, scene.scope.draws)
+    robustness_charts.save_spread_chart(scene.charts / "spread.png", study, f"{scene.placed} under pose errors")
+    robustness_charts.save_loss_chart(scene.charts / "blame.png", under_errors, f"{scene.placed}: what costs coverage")
+    robustness_charts.save_frontier_chart(
         scene.charts / "frontier.png", study, f"{scene.placed}: what robustness costs and saves"
     )
     return Chapter(
@@ -183,35 +181,28 @@ def poses(scene: StudiedScene) -> Generator[Progress, None, Chapter]:
 def failures(scene: StudiedScene) -> Generator[Progress, None, Chapter]:
     """Study placements under sensor failures and multi-cover."""
     study = yield from _robust(scene, RISKS)
-    pose_error_charts.save_spread_chart(scene.charts / "failures.png", study, f"{scene.placed}: failures")
+    robustness_charts.save_spread_chart(scene.charts / "failures.png", study, f"{scene.placed}: failures")
     caption = "Distribution of remaining coverage over unseen draws: placements for failures and the nominal optimum"
     return Chapter(f"Failures: {scene.placed}", robust_rows(study), (Chart("failures.png", caption),))
 
 
-def _robust(scene: StudiedScene, risks: Sequence[Risk]) -> Generator[Progress, None, RobustStudy]:
+def _robust(scene: StudiedScene, risks: Sequence[Risk]) -> Generator[Progress, None, tuple[Comparison, ...]]:
     """Optimise for risk measures, and evaluate the placements on held-out scenarios."""
-    around, problem, scenarios = surroundings(scene.survey), scene.problem(scene.sensor), scene.scope.robust
-    placements = yield from robust_placements(around, problem, scenarios, risks, scene.survey.settings.limits)
-    return (yield from robust_study(around, problem, scenarios, placements))
+    problem = RobustProblem(surroundings(scene.survey), scene.problem(scene.sensor), scene.scope.robust)
+    placements = yield from problem.placements(risks, scene.survey.settings.limits)
+    return (yield from problem.compare(*placements))
 
 
 def traffic(scene: StudiedScene) -> Generator[Progress, None, Chapter]:
     """Study placements in traffic."""
-    survey = scene.survey
-    around, problem = surroundings(survey), scene.problem(scene.sensor)
-    runs_to_choose, runs_to_evaluate = split_runs(scene.runs)
-    to_choose, to_evaluate = scene.scope.instants
-    scenarios = yield from traffic_scenarios(around, problem, spread_instants(runs_to_choose, to_choose, seed=0))
-    evaluation = spread_instants(runs_to_evaluate, to_evaluate, seed=1)
-    placements = yield from traffic_placements(problem, scenarios, survey.settings.limits)
-    study = yield from traffic_study(around, problem, placements, to_choose, evaluation)
-    chosen = study.traffic.placement.chosen
-    deployment = deploy(survey.site, survey.models, survey.grid.rows(chosen), chosen)
+    survey, scenarios = scene.survey, scene.scope.traffic
+    problem = RobustProblem(surroundings(survey), scene.problem(scene.sensor), scenarios, split_runs(scene.runs))
+    placements = yield from problem.placements([Risk()], survey.settings.limits)
+    (study,) = yield from problem.compare(*placements)
+    deployment = survey.deploy(study.robust.placement.chosen)
     title = f"{scene.placed} in traffic"
-    traffic_charts.save_time_map(
-        scene.charts / "time_seen.png", survey.geometry, survey.site, deployment, study.traffic, title
-    )
-    traffic_charts.save_traffic_chart(scene.charts / "promise.png", study, scene.placed, title)
+    robustness_charts.save_time_map(scene.charts / "time_seen.png", survey, deployment, study.robust, title)
+    robustness_charts.save_traffic_chart(scene.charts / "promise.png", study, scene.placed, title)
     return Chapter(
         f"Occlusion by traffic: {scene.placed}",
         traffic_rows(study),
@@ -229,8 +220,7 @@ def weather(scene: StudiedScene) -> Generator[Progress, None, Chapter]:
     survey = scene.survey
     study = yield from weather_study(survey.geometry, survey.settings)
     best = yield from solve(scene.problem(scene.sensor), survey.settings.limits)
-    deployment = deploy(survey.site, survey.models, survey.grid.rows(best.chosen), best.chosen)
-    sensors = deployment.sensors
+    sensors = survey.deploy(best.chosen).sensors
     rows = weather_rows(study, untouched_types(survey, scene.placed, sensors))
     limits_charts.save_weather_chart(scene.charts / "weather.png", study, f"{scene.name} in rain and fog")
     caption = "Coverage by weather: placements for clear air and for the weather, and sensors with a longer range"

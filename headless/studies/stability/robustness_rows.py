@@ -1,11 +1,12 @@
 """Results of robustness studies, as rows of the stability page."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
-from seip_addon.core.choosing.robustness.pose_study import LOW_QUANTILE, PoseStudy
-from seip_addon.core.choosing.robustness.robust_study import Contender, RobustStudy
-from seip_addon.core.choosing.robustness.traffic_study import NOTABLE_LOSS, TrafficEvaluation, TrafficStudy
-from seip_addon.core.estimates import mean_of, quantile_gain, quantile_of
+from seip_addon.core.choosing.robustness.comparison import Comparison, EvaluatedPlacement
+from seip_addon.core.choosing.robustness.pose_study import LOW_QUANTILE, NOTABLE_LOSS, PoseStudy
+from seip_addon.core.estimates import IntervalEstimate, mean_of, quantile_gain, quantile_of
 
 from .rows import Row
 
@@ -15,7 +16,7 @@ QUANTILES = (0.05, 0.5, 0.95)  # of coverage, which must be the same in half of 
 
 def pose_rows(study: PoseStudy) -> tuple[Row, ...]:
     """Return the results of the study of pose errors as rows."""
-    errors, settings = study.settings.errors, study.settings
+    errors = study.errors
     losses, kinds = study.loss_by_sensor(), study.loss_by_kind()
     worst, certain = study.worst_sensor()
     regime = (
@@ -26,9 +27,9 @@ def pose_rows(study: PoseStudy) -> tuple[Row, ...]:
         Row(
             "coverage of a placement",
             regime,
-            f"planned {study.planned:.2%}; 5 % quantile {study.quantile(0.05).describe()}, "
+            f"planned {study.planned:.2%}; 5 % quantile {study.low.describe()}, "
             f"mean {mean_of(study.together).describe()}",
-            f"{settings.draws} draws, errors of all sensors; half of them "
+            f"{len(study.together)} draws, errors of all sensors; half of them "
             f"{'give the same result' if poses_converged(study) else 'give a different result: take more'}",
             "placement over pose errors: `seip place --pose-errors`; `--risk none` reports the 5 % quantile",
         ),
@@ -48,7 +49,7 @@ def pose_rows(study: PoseStudy) -> tuple[Row, ...]:
                 "a kind of error",
                 regime,
                 f"{costly} costs most: " + ", ".join(f"{kind} {loss.as_points()}" for kind, loss in kinds.items()),
-                f"mean loss of coverage with only one kind of error, {settings.draws_of_kind} draws",
+                f"mean loss of coverage with only one kind of error, {len(study.by_kind[costly])} draws",
                 "tighten the installation tolerance of the most costly kind first",
             )
         )
@@ -63,46 +64,46 @@ def poses_converged(study: PoseStudy) -> bool:
     return all(one.agrees_with(other) for one, other in pairs)
 
 
-def robust_rows(study: RobustStudy) -> tuple[Row, ...]:
+def robust_rows(comparisons: Sequence[Comparison]) -> tuple[Row, ...]:
     """Return the results of the study of robust placements as rows, one for each placement."""
-    scenarios, errors = study.scenarios, study.scenarios.pose_errors
+    scenarios, errors = comparisons[0].scenarios, comparisons[0].scenarios.pose_errors
     regime = f"σ {errors.position:g} m, {np.degrees(errors.tilt):.3g}°; {scenarios.optimised} scenarios"
     return tuple(
         Row(
-            f"placement for {contender.name}",
+            f"placement for {one.robust.name}",
             regime,
-            f"gives away {100 * study.price(contender):.2f} points of planned coverage; 5 % quantile of "
-            f"{contender.evaluated_by.describe_outcome()} {contender.low.describe()} against "
-            f"{study.beside(contender).low.describe()} of the nominal optimum: "
-            f"{study.saving(contender).as_change()}",
+            f"gives away {100 * one.price:.2f} points of planned coverage; 5 % quantile of "
+            f"{one.robust.risk.describe_outcome()} {one.robust.low.describe()} against "
+            f"{one.nominal.low.describe()} of the nominal optimum: {one.gain.as_change()}",
             f"{scenarios.evaluated} draws not used in the optimisation; half of them "
-            f"{'give the same result' if saving_converged(study, contender) else 'give a different result: take more'}",
-            f"certificate: within {contender.placement.gap:.2%} of the best possible objective",
+            f"{'give the same result' if gain_converged(one) else 'give a different result: take more'}",
+            f"certificate: within {one.robust.placement.gap:.2%} of the best possible objective",
         )
-        for contender in study.robust
+        for one in comparisons
     )
 
 
-def saving_converged(study: RobustStudy, contender: Contender) -> bool:
-    """Return whether half of the unseen draws give the same gain of a contender, within the intervals."""
-    half = len(contender.unseen) // 2
-    saved = quantile_gain(contender.unseen[:half], study.beside(contender).unseen[:half], LOW_QUANTILE)
-    return saved.agrees_with(study.saving(contender))
+def gain_converged(comparison: Comparison) -> bool:
+    """Return whether half of the unseen draws give the same gain in the 5 % quantile, within the intervals."""
+    robust, nominal = comparison.robust.held_out, comparison.nominal.held_out
+    half = len(robust) // 2
+    return quantile_gain(robust[:half], nominal[:half], LOW_QUANTILE).agrees_with(comparison.gain)
 
 
-def traffic_rows(study: TrafficStudy) -> tuple[Row, ...]:
+def traffic_rows(comparison: Comparison) -> tuple[Row, ...]:
     """Return the results of the study of traffic as rows."""
-    regime = f"{study.road_users:.0f} road users at a time"
-    seen, batch = study.empty, study.empty.batch
+    seen, traffic = comparison.nominal, comparison.robust
+    regime = f"{seen.road_users:.0f} road users at a time"
+    batches = len(np.unique(seen.instants.batch)) if seen.instants else 0
     how = (
-        f"{len(batch)} instants in {len(np.unique(batch))} stretches of time, of runs not used in the optimisation; "
-        f"half of them {'give the same result' if study.is_converged() else 'give a different result: take more'}"
+        f"{len(seen.held_out)} instants in {batches} stretches of time, of runs not used in the optimisation; "
+        f"half of them {'give the same result' if comparison.is_converged() else 'give a different result: take more'}"
     )
     loss = Row(
         "view of the road",
         regime,
-        f"{seen.empty:.2%} of the targets' weight is visible on the empty road, {seen.mean.describe()} on average "
-        f"over time in traffic: vehicles hide {seen.hidden.describe()} of the visible weight, and "
+        f"{seen.nominal:.2%} of the targets' weight is visible on the empty road, {seen.mean.describe()} on average "
+        f"over time in traffic: vehicles hide {hidden(seen).describe()} of the visible weight, and "
         f"{_rarely_seen(seen):.1%} of the visible targets are seen less than {MOSTLY_SEEN_SHARE:.0%} of the time",
         how,
         f"a warning if {NOTABLE_LOSS:.0%} of the weight or more is lost, and a map of the share of time",
@@ -110,13 +111,20 @@ def traffic_rows(study: TrafficStudy) -> tuple[Row, ...]:
     gain = Row(
         "placement for the empty road, to see the road",
         regime,
-        f"a placement optimised in traffic sees {study.traffic.mean.describe()}, {study.gain.as_change()}",
-        f"optimised for {study.chosen_at} instants; {how}",
-        f"placement over instants of traffic; certificate: within {study.traffic.placement.gap:.2%} of the best",
+        f"a placement optimised in traffic sees {traffic.mean.describe()}, {comparison.gain.as_change()}",
+        f"optimised for {comparison.scenarios.optimised} instants; {how}",
+        f"placement over instants of traffic; certificate: within {traffic.placement.gap:.2%} of the best",
     )
     return (loss, gain)
 
 
-def _rarely_seen(seen: TrafficEvaluation) -> float:
+def hidden(placed: EvaluatedPlacement) -> IntervalEstimate:
+    """Estimate the share of the targets seen on the empty road that vehicles hide, on average over time."""
+    empty, traffic = placed.seen[0], placed.seen[1:]
+    return placed.estimate((empty & ~traffic).sum(axis=1) / max(1, np.count_nonzero(empty)))
+
+
+def _rarely_seen(placed: EvaluatedPlacement) -> float:
     """Return the share of the targets seen on the empty road that are not mostly seen in traffic."""
-    return float((seen.time[seen.empty_targets] < MOSTLY_SEEN_SHARE).mean()) if seen.empty_targets.any() else 0.0
+    time = placed.seen[1:, placed.seen[0]].mean(axis=0)
+    return float((time < MOSTLY_SEEN_SHARE).mean()) if len(time) else 0.0

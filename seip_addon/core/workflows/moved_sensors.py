@@ -85,8 +85,6 @@ def evaluate_moved_sensors(
         gap=math.inf,
         status=MOVED,
         solver="none",
-        seconds=0.0,
-        covered=covered,
         price=deployment.price,
     )
     return Solution(objective, placement, None, deployment)

@@ -16,11 +16,8 @@ from ..choosing.placement.objective import Objective, Solution, criterion_of, pl
 from ..choosing.placement.problem import Placement
 from ..errors import SeipError
 from ..progress import Progress
-from ..sensing.returns.occlusion import returns_in_traffic
-from ..sensing.returns.returns_grid import stored_returns
-from ..sensing.returns.road_users import road_users
 from .network_sites import NetworkPlace
-from .returns import returns_solution, user_weights
+from .returns import survey_returns
 from .survey import Survey
 
 
@@ -48,12 +45,8 @@ def site_problem(survey: Survey, objective: Objective, place: NetworkPlace) -> G
     criterion = criterion_of(objective, survey.models)
     returns, weights = np.zeros((len(candidates), 0), dtype=np.float32), np.zeros(0)
     if criterion == "returns":
-        users = road_users(survey.geometry)
-        grid = yield from stored_returns(
-            survey.returns_path, site, users, survey.models, survey.settings.engine, threads=1
-        )
-        returns = returns_in_traffic(grid.returns, candidates.xyz, users)
-        weights = user_weights(users, objective)
+        found = yield from survey_returns(survey, objective, threads=1)
+        returns, weights = found.in_traffic(), found.weights
     geographic = site.geographic(candidates.xyz)
     if geographic is None:  # a scene without a projection lies where the table says
         latlon = np.tile((place.latitude, place.longitude), (len(candidates), 1))
@@ -97,17 +90,11 @@ def taken_solution(survey: Survey, objective: Objective, taken: SolvedBudget) ->
         gap=0.0 if optimal else math.expm1(bound - value) if of_returns else relative_gap(value, bound),
         status="optimal" if optimal else "feasible",
         solver="network allocation",
-        seconds=0.0,
-        covered=covered,
         price=taken.price,
         notes=("the money at this site is its share of the budget of a network",),
     )
     if of_returns:
-        users = road_users(survey.geometry)
-        grid = yield from stored_returns(
-            survey.returns_path, survey.site, users, survey.models, survey.settings.engine, threads=1
-        )
-        return returns_solution(survey, grid, users, objective, (placement, None))
+        return (yield from survey_returns(survey, objective, threads=1)).solution(placement, None)
     return Solution(objective, placement, None, deploy(survey.site, survey.models, rows, chosen))
 
 

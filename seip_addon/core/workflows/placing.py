@@ -21,33 +21,32 @@ from ..choosing.placement.objective import (
     Solution,
     criterion_of,
     placement_problem,
-    target_weights,
     with_count,
 )
-from ..choosing.placement.problem import PlacementProblem
+from ..choosing.placement.problem import Placement
 from ..choosing.placement.returns_summary import ReturnsPoint
-from ..choosing.placement.risk import Risk
+from ..choosing.placement.risk import NOMINAL, Risk
+from ..choosing.placement.scenarios import Scenarios
 from ..choosing.placement.search_limits import DEFAULT_LIMITS, SolverLimits
 from ..choosing.placement.solver import solve, solve_greedy
+from ..choosing.robustness.comparison import Comparison
 from ..choosing.robustness.gain_band import with_gain_band
-from ..choosing.robustness.pose_error_evaluation import PoseErrorEvaluation
-from ..choosing.robustness.pose_study import PoseStudySettings, pose_message, pose_study
-from ..choosing.robustness.robust_study import RobustPlacements, robust_placements, robust_study
-from ..choosing.robustness.traffic_study import (
-    evaluate_in_traffic,
-    traffic_placements,
-    traffic_scenarios,
-    traffic_study,
-)
+from ..choosing.robustness.pose_study import pose_study
+from ..choosing.robustness.robust_problem import RobustProblem
 from ..errors import SeipError
 from ..progress import Progress
 from ..sensing.lidar.model import LidarModel
-from ..sensing.scenarios.traffic_instants import spread_instants
-from ..sensing.visibility.surroundings import Surroundings
 from ..site.site import Site
-from .returns import crossing_returns, place_by_returns, returns_problem
+from .returns import crossing_returns, place_by_returns, survey_returns
 from .survey import Survey, surroundings
 from .traffic_runs import TrafficRuns
+
+DRAWS_OF_KIND = 100
+"""Largest number of draws with one kind of pose error only."""
+
+ACCEPTED_MESSAGE = "accepted before the end of the search: running it to its end may find a better placement"
+
+_OVER_INSTANTS = {1.0: "on average over", 0.25: "in the worst quarter of", 0.0: "in the worst of"}
 
 
 def optimise(
@@ -79,14 +78,6 @@ def optimise(
     return Solution(with_count(objective, site), placement, greedy, deployment)
 
 
-DRAWS_OF_KIND = 100
-"""Largest number of draws with one kind of pose error only."""
-
-ACCEPTED_MESSAGE = "accepted before the end of the search: running it to its end may find a better placement"
-
-_OVER_INSTANTS = {1.0: "on average over", 0.25: "in the worst quarter of", 0.0: "in the worst of"}
-
-
 def place(
     survey: Survey, objective: Objective, runs: TrafficRuns | None = None, acceptance: Acceptance | None = None
 ) -> Generator[Progress, None, Solution]:
@@ -104,16 +95,15 @@ def place(
     SeipError
         Same as for `placement_problem`, `solve` and `spread_instants`.
     """
-    measure, scenarios = objective.measure, objective.scenarios
+    measure = objective.measure
     limits = replace(survey.settings.limits, acceptance=acceptance)
-    if measure is None:
-        solution = yield from _nominal(survey, objective, limits)
-    elif scenarios.kind == "traffic":
-        solution = yield from _in_traffic(survey, objective, limits, measure, _required(runs))
+    if measure is not None:
+        solution = yield from _over_scenarios(survey, objective, limits, measure, runs)
+    elif criterion_of(objective, survey.models) == "returns":
+        solution = yield from place_by_returns(survey, objective, limits)
     else:
-        solution = yield from _under_risk(survey, objective, limits, measure)
-    around = surroundings(survey)
-    deployment = yield from with_gain_band(around, solution.deployment)
+        solution = yield from optimise(survey.site, survey.grid.visible, survey.models, objective, limits)
+    deployment = yield from with_gain_band(surroundings(survey), solution.deployment)
     notes = [*solution.placement.notes]
     if acceptance is not None and acceptance.accepted and solution.placement.status != "optimal":
         notes.append(ACCEPTED_MESSAGE)
@@ -142,9 +132,10 @@ def _with_front(survey: Survey, solution: Solution) -> Generator[Progress, None,
     objective, placement, summary = solution.objective, solution.placement, solution.deployment.returns
     if placement.status == MOVED or not len(placement.chosen) or objective.measure is not None:
         return solution
-    problem = placement_problem(survey.site, survey.grid.visible, survey.models, objective)
-    if summary is not None:
-        problem, _, _ = yield from returns_problem(survey, objective)
+    if summary is None:
+        problem = placement_problem(survey.site, survey.grid.visible, survey.models, objective)
+    else:
+        problem = (yield from survey_returns(survey, objective)).problem()
     # the bound of a solution holds for its own number of sensors unless a budget or a coverage limits it
     own = range(len(placement.chosen), (objective.count or 0) + 1)
     free = objective.budget is None and not objective.cheapest
@@ -161,91 +152,63 @@ def _with_front(survey: Survey, solution: Solution) -> Generator[Progress, None,
     return replace(solution, deployment=deployment)
 
 
-def _nominal(survey: Survey, objective: Objective, limits: SolverLimits) -> Generator[Progress, None, Solution]:
-    """Optimise for nominal poses on the empty road."""
-    if criterion_of(objective, survey.models) == "returns":
-        return (yield from place_by_returns(survey, objective, limits))
-    return (yield from optimise(survey.site, survey.grid.visible, survey.models, objective, limits))
+def _robust_problem(survey: Survey, objective: Objective, runs: TrafficRuns | None) -> RobustProblem:
+    """Return the problem of an objective over its scenarios."""
+    problem = placement_problem(survey.site, survey.grid.visible, survey.models, objective)
+    if objective.scenarios.kind != "traffic":
+        return RobustProblem(surroundings(survey), problem, objective.scenarios)
+    if runs is None:
+        raise SeipError("the scenarios are traffic, but there are no runs: name runs of traffic")
+    return RobustProblem(surroundings(survey), problem, objective.scenarios, (runs.optimisation, runs.evaluation))
 
 
-def _under_risk(
-    survey: Survey, objective: Objective, limits: SolverLimits, measure: Risk
+def _over_scenarios(
+    survey: Survey, objective: Objective, limits: SolverLimits, measure: Risk, runs: TrafficRuns | None
 ) -> Generator[Progress, None, Solution]:
-    """Optimise a risk measure over pose errors, or over sensor failures in the nominal scenario."""
-    site, models, grid = survey.site, survey.models, survey.grid
-    around, scenarios = surroundings(survey), objective.scenarios
-    problem = placement_problem(site, grid.visible, models, objective)
-    placements = yield from robust_placements(around, problem, scenarios, [measure], limits)
-    placement = placements.robust[measure]
-    poses = placement.chosen
-    deployment = deploy(site, models, grid.rows(poses), poses)
-    over = f" over {scenarios.optimised} scenarios" if scenarios.errs else ""
-    name = measure.describe() if scenarios.errs else measure.describe_outcome()
-    notes = (f"{CHOSEN_FOR}for {name}{over}: objective, bound and gap refer to that", *placement.notes)
-    evaluate = _evaluated_under_risk(around, problem, objective, placements, deployment)
-    evaluation = yield from until_accepted(evaluate, limits.acceptance, None)
-    notes += () if evaluation is None else evaluation.messages()
-    return Solution(with_count(objective, site), replace(placement, notes=notes), None, deployment, evaluation)
-
-
-def _evaluated_under_risk(
-    around: Surroundings,
-    problem: PlacementProblem,
-    objective: Objective,
-    placements: RobustPlacements,
-    deployment: Deployment,
-) -> Generator[Progress, None, PoseErrorEvaluation]:
-    """Evaluate placements on held-out scenarios, and the robust one under each kind of pose error."""
-    scenarios = objective.scenarios
-    study = yield from robust_study(around, problem, scenarios, placements)
-    under_errors = None
-    if scenarios.errs:
-        draws = scenarios.evaluated
-        settings = PoseStudySettings(scenarios.pose_errors, draws, min(DRAWS_OF_KIND, draws), scenarios.seed + 1)
-        under_errors = yield from pose_study(around, deployment, settings)
-    return PoseErrorEvaluation(study, under_errors)
-
-
-def _in_traffic(
-    survey: Survey, objective: Objective, limits: SolverLimits, measure: Risk, runs: TrafficRuns
-) -> Generator[Progress, None, Solution]:
-    """Optimise a risk measure over instants of traffic, whose vehicles block the view."""
-    site, models, grid = survey.site, survey.models, survey.grid
-    around, scenarios = surroundings(survey), objective.scenarios
-    problem = placement_problem(site, grid.visible, models, objective)
-    instants = spread_instants(runs.optimisation, scenarios.optimised, scenarios.seed)
-    views = yield from traffic_scenarios(around, problem, instants)
-    placements = yield from traffic_placements(problem, views, limits, measure)
-    placement = placements["traffic"]
-    held_out = spread_instants(runs.evaluation, scenarios.evaluated, scenarios.seed + 1)
-    evaluate = traffic_study(around, problem, placements, len(instants), held_out)
-    study = yield from until_accepted(evaluate, limits.acceptance, None)
-    note = (
-        f"{CHOSEN_FOR}to see the road in traffic, {_OVER_INSTANTS[measure.tail]} {len(instants)} "
-        "instants: objective, bound and gap refer to that"
-    )
-    messages = () if study is None else study.messages()
+    """Optimise a risk measure over scenarios, and compare the placement with the nominal optimum."""
+    robust = _robust_problem(survey, objective, runs)
+    nominal, placements = yield from robust.placements([measure], limits)
+    placement = placements[measure]
+    deployment = survey.deploy(placement.chosen)
+    compared = _compared(robust, nominal, placements, deployment)
+    evaluation = yield from until_accepted(compared, limits.acceptance, None)
+    note = f"{CHOSEN_FOR}{_purpose(robust.scenarios, measure)}: objective, bound and gap refer to that"
+    messages = () if evaluation is None else evaluation.messages()
     placement = replace(placement, notes=(note, *placement.notes, *messages))
-    deployment = deploy(site, models, grid.rows(placement.chosen), placement.chosen)
-    return Solution(with_count(objective, site), placement, None, deployment, study)
+    return Solution(with_count(objective, survey.site), placement, None, deployment, evaluation)
+
+
+def _purpose(scenarios: Scenarios, measure: Risk) -> str:
+    """Return the purpose of a placement that is optimised over scenarios, as text that follows `CHOSEN_FOR`."""
+    if scenarios.kind == "traffic":
+        return f"to see the road in traffic, {_OVER_INSTANTS[measure.tail]} {scenarios.optimised} instants"
+    if scenarios.errs:
+        return f"for {measure.describe()} over {scenarios.optimised} scenarios"
+    return f"for {measure.describe_outcome()}"
+
+
+def _compared(
+    robust: RobustProblem, nominal: Placement, placements: Mapping[Risk, Placement], deployment: Deployment
+) -> Generator[Progress, None, Comparison]:
+    """Compare the placement with the nominal optimum, and study it under each kind of pose error."""
+    (comparison,) = yield from robust.compare(nominal, placements)
+    scenarios = robust.scenarios
+    if not scenarios.errs:
+        return comparison
+    draws = scenarios.evaluated, min(DRAWS_OF_KIND, scenarios.evaluated)
+    study = yield from pose_study(robust.around, deployment, scenarios.pose_errors, scenarios.seed + 1, draws)
+    return replace(comparison, pose_study=study)
 
 
 def _evaluated(survey: Survey, solution: Solution, runs: TrafficRuns | None) -> Generator[Progress, None, list[str]]:
     """Return messages on a nominal placement in the scenarios of its objective."""
-    objective, around = solution.objective, surroundings(survey)
-    scenarios = objective.scenarios
+    scenarios = solution.objective.scenarios
+    if scenarios.kind == "nominal":
+        return []
+    robust = _robust_problem(survey, solution.objective, runs)
     if scenarios.errs:
-        settings = PoseStudySettings(scenarios.pose_errors, scenarios.evaluated, 0, scenarios.seed + 1)
-        return [pose_message((yield from pose_study(around, solution.deployment, settings)))]
-    if scenarios.kind == "traffic":
-        held_out = spread_instants(_required(runs).evaluation, scenarios.evaluated, scenarios.seed + 1)
-        weights, placements = target_weights(survey.site, objective), {"the empty road": solution.placement}
-        (evaluation,) = yield from evaluate_in_traffic(around, placements, weights, held_out)
-        return [evaluation.message]
-    return []
-
-
-def _required(runs: TrafficRuns | None) -> TrafficRuns:
-    if runs is None:
-        raise SeipError("the scenarios are traffic, but there are no runs: name runs of traffic")
-    return runs
+        errors, seed, draws = scenarios.pose_errors, scenarios.seed + 1, (scenarios.evaluated, 0)
+        study = yield from pose_study(robust.around, solution.deployment, errors, seed, draws)
+        return [study.message()]
+    (evaluated,) = yield from robust.evaluate([("the empty road", solution.placement, NOMINAL)])
+    return [evaluated.traffic_message]

@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..choosing.placement.deployment import deploy, pose_prices
-from ..choosing.placement.objective import MOVED, Solution, target_weights
+from ..choosing.placement.deployment import pose_prices
+from ..choosing.placement.objective import MOVED, Solution
 from ..errors import SeipError
 from ..output.results.located import LOCATED_FILES, missing_sentence
 from ..output.results.placement_record import PlacementRecord, Provenance, placement_record
@@ -94,21 +94,18 @@ def restored_solution(survey: Survey, record: PlacementRecord) -> Generator[Prog
     SeipError
         The record belongs to a different survey, or contains a pose that is not a candidate.
     """
-    site, grid = survey.site, survey.grid
-    if record.inputs.get("visibility") != grid.key or not record.is_of(inputs_of(survey)):
+    if record.inputs.get("visibility") != survey.grid.key or not record.is_of(inputs_of(survey)):
         raise SeipError(STALE)
     if record.objective.status == MOVED:
         return (yield from _restored_by_hand(survey, record))
-    poses = range(len(site.candidates))
+    poses = range(len(survey.site.candidates))
     if not all(sensor.pose in poses for sensor in record.sensors):
         raise SeipError(STALE)
     objective, chosen = record.request.goal, record.poses
-    covered = float(target_weights(site, objective)[grid.times_seen(chosen) > 0].sum())
-    deployment = deploy(site, survey.models, grid.rows(chosen), chosen)
-    known = replace(deployment, gain_band=record.coverage.gain_band, returns=record.returns)
+    known = replace(survey.deploy(chosen), gain_band=record.coverage.gain_band, returns=record.returns)
     if record.returns is not None:
         known = replace(known, pedestrian_returns=stored_pedestrian_returns(survey, chosen))
-    return Solution(objective, record.placement(covered), None, known, front=record.front, crossings=record.crossings)
+    return Solution(objective, record.placement, None, known, front=record.front, crossings=record.crossings)
 
 
 def _restored_by_hand(survey: Survey, record: PlacementRecord) -> Generator[Progress, None, Solution]:

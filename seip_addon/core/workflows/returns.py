@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Generator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import shapely
@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from ..arrays import Float, Integer
 from ..choosing.placement.concave import LOG_RETURNS
-from ..choosing.placement.deployment import deploy
 from ..choosing.placement.objective import (
     CHOSEN_FOR,
     Objective,
@@ -40,6 +39,77 @@ CROSSING_SHARE = 0.5
 at two sites, 47 and 74 % of the pedestrians in the region were there (docs/detection.md)."""
 
 
+@dataclass(frozen=True, eq=False)
+class SurveyReturns:
+    """Expected returns from the road users of a survey, as an objective weights them.
+
+    Parameters
+    ----------
+    grid : ReturnsGrid
+        Returns in plain view.
+    """
+
+    survey: Survey
+    objective: Objective
+    users: RoadUsers
+    grid: ReturnsGrid
+
+    @property
+    def weights(self) -> Float:
+        """Weight of each road user, (m,) float64; see `user_weights`."""
+        return user_weights(self.users, self.objective)
+
+    def in_traffic(self, poses: Integer | slice = slice(None)) -> NDArray[np.float32]:
+        """Return what is left of the returns from poses by traffic that hides road users, (k, m) float32."""
+        origins = self.survey.site.candidates.xyz[poses]
+        return returns_in_traffic(self.grid.returns[poses], origins, self.users)
+
+    def problem(self) -> PlacementProblem:
+        """State the objective as a problem whose value is the mean of ln(1 + returns in traffic)."""
+        constraints = vars(placement_constraints(self.survey.site, self.survey.models, self.objective))
+        weights = self.weights
+        return PlacementProblem(
+            **{**constraints, "weights": weights / math.fsum(weights)}, amounts=self.in_traffic(), g=LOG_RETURNS
+        )
+
+    def summary(self, chosen: Integer) -> ReturnsSummary:
+        """Return the summary of the returns of chosen poses.
+
+        What the placement was chosen for has an allowance for traffic that hides road users. Returns from pedestrians
+        on crossings have none: they tell whether a pedestrian in plain view is detected.
+        """
+        users = self.users
+        in_plain_view = self.grid.returns[chosen].sum(axis=0, dtype=np.float64)
+        together = self.in_traffic(chosen).sum(axis=0, dtype=np.float64)
+        in_regions = weights_in_regions(self.objective, users.weight, users.central)
+        kinds = [(name, users.body == body) for body, name in enumerate(BODIES)]
+        of_each: dict[str, float] = {name: _typical(together[own], in_regions[own]) for name, own in kinds}
+        crossings = _least_on_crossings(in_plain_view, users)
+        return ReturnsSummary(_typical(together, self.weights), of_each, crossings)
+
+    def solution(self, placement: Placement, greedy: Placement | None) -> Solution:
+        """Return the solution of a placement that was chosen for returns."""
+        survey, chosen = self.survey, placement.chosen
+        summary = self.summary(chosen)
+        note = f"{CHOSEN_FOR}for returns from road users: {summary.describe()} in one revolution (geometric means)"
+        pedestrians = _near_targets(survey.site.targets, self.users, self.grid, chosen)
+        return Solution(
+            with_count(self.objective, survey.site),
+            replace(placement, notes=(note, *summary.warnings(), *placement.notes)),
+            greedy,
+            replace(survey.deploy(chosen), returns=summary, pedestrian_returns=pedestrians),
+        )
+
+
+def survey_returns(
+    survey: Survey, objective: Objective, threads: int | None = None
+) -> Generator[Progress, None, SurveyReturns]:
+    """Compute the returns of a survey, or read them from its file."""
+    users, engine = road_users(survey.geometry), survey.settings.engine
+    grid = yield from stored_returns(survey.returns_path, survey.site, users, survey.models, engine, threads)
+    return SurveyReturns(survey, objective, users, grid)
+
+
 def place_by_returns(survey: Survey, objective: Objective, limits: SolverLimits) -> Generator[Progress, None, Solution]:
     """Choose the placement with the most returns from road users.
 
@@ -48,64 +118,14 @@ def place_by_returns(survey: Survey, objective: Objective, limits: SolverLimits)
     SeipError
         Same as for `placement_problem` and `solve`.
     """
-    problem, grid, users = yield from returns_problem(survey, objective)
-    origins = survey.site.candidates.xyz
+    returns = yield from survey_returns(survey, objective)
+    problem = returns.problem()
 
     def describe(chosen: Integer, value: float) -> str:
-        summary = _summarised(grid.returns[chosen], origins[chosen], users, objective)
-        return f"{math.expm1(value):.4g} returns, {summary.describe_each()}"
+        return f"{math.expm1(value):.4g} returns, {returns.summary(chosen).describe_each()}"
 
     placement = yield from solve(problem, limits, describe=describe)
-    return returns_solution(survey, grid, users, objective, (placement, solve_greedy(problem)))
-
-
-def returns_problem(
-    survey: Survey, objective: Objective
-) -> Generator[Progress, None, tuple[PlacementProblem, ReturnsGrid, RoadUsers]]:
-    """State an objective as a problem of returns from road users, whose weights add up to 1.
-
-    Returns
-    -------
-    PlacementProblem
-        Its value is the mean of ln(1 + returns); returns are those left by traffic that hides road users.
-    ReturnsGrid
-        Returns in plain view.
-    RoadUsers
-    """
-    site, models = survey.site, survey.models
-    users = road_users(survey.geometry)
-    grid = yield from stored_returns(survey.returns_path, site, users, models, survey.settings.engine)
-    returns = returns_in_traffic(grid.returns, site.candidates.xyz, users)
-    weights = user_weights(users, objective)
-    constraints = vars(placement_constraints(site, models, objective))
-    problem = PlacementProblem(
-        **{**constraints, "weights": weights / math.fsum(weights)}, amounts=returns, g=LOG_RETURNS
-    )
-    return problem, grid, users
-
-
-def returns_solution(
-    survey: Survey,
-    grid: ReturnsGrid,
-    users: RoadUsers,
-    objective: Objective,
-    placements: tuple[Placement, Placement | None],
-) -> Solution:
-    """Return the solution of a placement that was chosen for returns, with the greedy placement if there is one."""
-    placement, greedy = placements
-    chosen = placement.chosen
-    summary = _summarised(grid.returns[chosen], survey.site.candidates.xyz[chosen], users, objective)
-    note = f"{CHOSEN_FOR}for returns from road users: {summary.describe()} in one revolution (geometric means)"
-    return Solution(
-        with_count(objective, survey.site),
-        replace(placement, notes=(note, *summary.warnings(), *placement.notes)),
-        greedy,
-        replace(
-            deploy(survey.site, survey.models, survey.grid.rows(chosen), chosen),
-            returns=summary,
-            pedestrian_returns=_near_targets(survey.site.targets, users, grid, chosen),
-        ),
-    )
+    return returns.solution(placement, solve_greedy(problem))
 
 
 def crossing_returns(survey: Survey, solution: Solution) -> tuple[CrossingReturns, ...]:
@@ -117,14 +137,8 @@ def crossing_returns(survey: Survey, solution: Solution) -> tuple[CrossingReturn
     on_crossing = np.flatnonzero(users.crossing >= 0)
     if not len(on_crossing) or not deployment.sensors:
         return ()
-    on_foot = replace(
-        users,
-        xyz=users.xyz[on_crossing],
-        body=users.body[on_crossing],
-        weight=users.weight[on_crossing],
-        central=users.central[on_crossing],
-        crossing=users.crossing[on_crossing],
-    )
+    parts = ("xyz", "body", "weight", "central", "crossing")
+    on_foot = replace(users, **{name: getattr(users, name)[on_crossing] for name in parts})
     caster = make_ray_caster(survey.site.triangles, engine_name(survey.settings.engine))
     together = sum(
         expected_returns(caster, sensor.xyz, sensor.orientation, sensor.model, on_foot)[0]
@@ -177,21 +191,6 @@ def user_weights(users: RoadUsers, objective: Objective) -> Float:
     each = share / share.sum() * len(users) / np.maximum(1, np.bincount(kind, minlength=len(share)))
     weights: Float = weights_in_regions(objective, users.weight, users.central) * each[kind]
     return weights
-
-
-def _summarised(returns: NDArray[np.float32], origins: Float, users: RoadUsers, objective: Objective) -> ReturnsSummary:
-    """Return the summary of the returns (k, m) of chosen poses at positions (k, 3).
-
-    What the placement was chosen for has an allowance for traffic that hides road users. Returns from pedestrians on
-    crossings have none: they tell whether a pedestrian in plain view is detected.
-    """
-    in_plain_view = returns.sum(axis=0, dtype=np.float64)
-    together = returns_in_traffic(returns, origins, users).sum(axis=0, dtype=np.float64)
-    weight = user_weights(users, objective)
-    in_regions = weights_in_regions(objective, users.weight, users.central)
-    kinds = [(name, users.body == body) for body, name in enumerate(BODIES)]
-    of_each: dict[str, float] = {name: _typical(together[own], in_regions[own]) for name, own in kinds}
-    return ReturnsSummary(_typical(together, weight), of_each, _least_on_crossings(in_plain_view, users))
 
 
 def _typical(returns: Float, weight: Float) -> float:

@@ -8,6 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
+from ..arrays import Integer
+from ..choosing.placement.deployment import Deployment, deploy
 from ..progress import Progress
 from ..sensing.lidar.carla_dropoff import CarlaDropoff
 from ..sensing.lidar.model import LidarModel, fields_of_view
@@ -124,6 +126,10 @@ class Survey(Layout):
 
     grid: VisibilityGrid
     returns_path: Path | None = None
+
+    def deploy(self, chosen: Integer) -> Deployment:
+        """Return the sensors at candidate poses (k,) with their coverage."""
+        return deploy(self.site, self.models, self.grid.rows(chosen), chosen)
 
 
 def grid_key(layout: Layout) -> str:

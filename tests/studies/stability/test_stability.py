@@ -10,7 +10,6 @@ from headless.studies.stability import command as stability
 import pytest
 
 from seip_addon.core.choosing.placement.scenarios import Scenarios
-from seip_addon.core.choosing.robustness.pose_study import PoseStudySettings
 
 SCENE = Path(__file__).resolve().parents[3] / "scenes" / "junction.blend"
 COARSE = [
@@ -28,9 +27,9 @@ COARSE = [
 LITTLE = stability_chapters.StabilityScope(
     grids=8,
     rays=200,
-    poses=PoseStudySettings(draws=20, draws_of_kind=5),
+    draws=(20, 5),
     robust=Scenarios("pose-errors", count=3, held_out=20),
-    instants=(2, 12),
+    traffic=Scenarios("traffic", count=2, held_out=12),
 )
 
 

@@ -62,6 +62,9 @@ class _Node:
         Parameters of a bound to begin from.
     composition : Composition, optional
         Numbers of sensors of each price.
+    reach : (n,) float64, optional
+        Upper bound on its placements with each candidate left, where these are in no order and not divided yet between
+        this stage and later ones.
     """
 
     rank: float
@@ -71,6 +74,7 @@ class _Node:
     first: Integer = field(compare=False)
     parameters: Float = field(compare=False)
     composition: Composition | None = field(compare=False, default=None)
+    reach: Float | None = field(compare=False, default=None)
 
 
 @dataclass(frozen=True, eq=False)
@@ -227,11 +231,11 @@ class BranchAndBound:
         self.incumbent.bound = max(self.incumbent.value, min(self.incumbent.bound, bound))
 
     def _push(self, node: _Node, bound: float) -> None:
-        """Open a node with a bound, or let it wait for a later stage."""
+        """Open a new node with a bound, or let it wait for a later stage."""
         if bound < self.incumbent.least_better or not len(node.first):
             return
         self._number += 1
-        node = replace(node, rank=-bound, number=self._number)
+        node.rank, node.number = -bound, self._number
         if bound < self._goal:
             self._waiting.append(node)
         else:
@@ -272,9 +276,18 @@ class BranchAndBound:
             rest=rest_of(self.instance, problem.node.chosen, left, problem.node.composition),
         )
 
+    def _divided(self, node: _Node) -> _Node:
+        """Return a node with the candidates left in ascending order, without those that wait for a later stage."""
+        if node.reach is None:
+            return node
+        whole = replace(node, reach=None)
+        self._push_unlikely(whole, node.reach)
+        kept = np.sort(node.left[node.reach >= max(self._goal, self.incumbent.least_better)])
+        return replace(whole, left=kept, first=kept)
+
     def _take(self, node: _Node) -> None:
         """Bound a node, offer the placement that its bound selects, and open its children."""
-        incumbent = self.incumbent
+        incumbent, node = self.incumbent, self._divided(node)
         left = self._addable(node)
         if not len(left):
             incumbent.offer(node.chosen)
@@ -370,27 +383,28 @@ class BranchAndBound:
                 most, reach = np.minimum(most, bound[0]), np.minimum(reach, bound[1])
         reach = np.minimum(reach, most[:, None])
         self.incumbent.work.spend(PAIR_OPERATIONS * reach.size)
-        for row in np.flatnonzero(most >= self.incumbent.least_better):
-            own, left = later[row], ordered[later[row]]
-            child = replace(problem.node, chosen=np.append(problem.node.chosen, ordered[rows[row]]), left=left)
-            if block.has_product and rest.count == LISTED - 1:
-                self._complete(child.chosen, left, reach[row, own])
+        for row in np.flatnonzero(most >= self.incumbent.least_better).tolist():
+            chosen = np.append(problem.node.chosen, ordered[rows[row]])
+            able = np.flatnonzero(later[row] & (reach[row] >= self.incumbent.least_better))
+            if not len(able):
+                self.incumbent.offer(chosen)
+            elif block.has_product and rest.count == LISTED - 1:
+                self._complete(chosen, ordered[able], reach[row, able])
             elif block.has_product and rest.count == LISTED:
-                able = own & (reach[row] >= self.incumbent.least_better)
-                members = order.candidates[able]
-                self._list_pairs(problem, child, order.candidates[rows[row]], members, values[row] + gains[row, able])
+                bounds = values[row] + gains[row, able]
+                self._list_pairs(problem, chosen, order.candidates[rows[row]], order.candidates[able], bounds)
             else:
-                self._push_unlikely(child, reach[row, own])
-                kept = np.sort(left[reach[row, own] >= max(self._goal, self.incumbent.least_better)])
-                self._push(replace(child, left=kept, first=kept), float(most[row]))
-                if not len(kept):
-                    self.incumbent.offer(child.chosen)
+                left, own = ordered[able], reach[row, able]
+                child = replace(problem.node, chosen=chosen, left=left, first=left, reach=own)
+                self._push(child, min(float(most[row]), float(own.max())))
 
-    def _list_pairs(self, problem: _Problem, child: _Node, own: int, left: Integer, values: Float) -> None:
-        """Offer the placements of a child with two sensors more that may be better.
+    def _list_pairs(self, problem: _Problem, chosen: Integer, own: int, left: Integer, values: Float) -> None:
+        """Offer the placements of a child with up to two sensors more that may be better.
 
         Parameters
         ----------
+        chosen : (k,) int64
+            Candidates of the child.
         own : int
             Candidate of the child, as an index among those of the problem.
         left : (n,) int64
@@ -399,9 +413,7 @@ class BranchAndBound:
             Upper bounds on the child with each of them.
         """
         incumbent, block = self.incumbent, problem.block
-        incumbent.offer(child.chosen)
-        if not len(left):
-            return
+        incumbent.offer(chosen)
         base = problem.base + block.amounts[own]
         targets = block.open_targets(base)
         part, base = block.of(left, targets), base[targets]
@@ -409,15 +421,15 @@ class BranchAndBound:
         incumbent.work.spend(PRODUCT_SHARE * len(left) * part.operations)
         members = problem.left[left]
         pairs[self.instance.conflict[np.ix_(members, members)] | np.tri(len(left), dtype=bool)] = -math.inf
-        prices = math.fsum(self.instance.price[child.chosen]) + self.instance.price[members]
+        prices = math.fsum(self.instance.price[chosen]) + self.instance.price[members]
         pairs[~self.instance.affordable(prices[:, None] + self.instance.price[members])] = -math.inf
         for one in np.flatnonzero(values >= incumbent.least_better):
-            incumbent.offer(np.append(child.chosen, members[one]))
+            incumbent.offer(np.append(chosen, members[one]))
         better = np.argwhere(pairs >= incumbent.least_better)
         for first, second in better[np.argsort(-pairs[tuple(better.T)], kind="stable")].tolist():
             if pairs[first, second] < incumbent.least_better:
                 return
-            incumbent.offer(np.append(child.chosen, members[[first, second]]))
+            incumbent.offer(np.append(chosen, members[[first, second]]))
 
     def _by_gains(
         self, rest: Rest, order: _Order, rows: Integer, values: Float, gains: Float

@@ -164,10 +164,9 @@ class _Cheapest:
         return assess(
             problem,
             instance.original[kept],
+            cost,
             cost if optimal else min(cost, least),
             optimal=optimal,
             solver=solver,
-            seconds=work.seconds,
-            notes=tuple(notes),
-            objective=cost,
+            notes=notes,
         )

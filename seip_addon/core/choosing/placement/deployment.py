@@ -106,12 +106,6 @@ class GainBand:
     sheets: tuple[str, ...]
     types: tuple[TypeBand, ...] = ()
 
-    @property
-    def unranked(self) -> tuple[tuple[TypeBand, TypeBand], ...]:
-        """Pairs of types whose bands overlap, so that they cannot be ranked."""
-        pairs = combinations(self.types, 2)
-        return tuple((one, other) for one, other in pairs if one.low <= other.high and other.low <= one.high)
-
     def messages(self) -> tuple[str, ...]:
         """Return messages on the band, and on the types that it does not rank."""
         messages = []
@@ -121,8 +115,10 @@ class GainBand:
                 f"{BAND} coverage is {_span(self.low, self.high)}: detection by {sheets} is derived from data "
                 "sheets, not calibrated on a sweep"
             )
-        types = dict.fromkeys(one for pair in self.unranked for one in pair)
-        if types:
+        pairs = combinations(self.types, 2)
+        overlaps = [(one, other) for one, other in pairs if one.low <= other.high and other.low <= one.high]
+        if overlaps:
+            types = dict.fromkeys(one for pair in overlaps for one in pair)
             bands = ", ".join(f"{one.sensor} {_span(one.low, one.high)}" for one in types)
             messages.append(f"{UNRANKED}, as their bands overlap where the sensors are mounted: {bands}")
         return tuple(messages)

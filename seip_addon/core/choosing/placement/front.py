@@ -8,9 +8,10 @@ from dataclasses import replace
 
 from ...errors import SeipError
 from ...progress import Progress, within
+from .instance import make_instance
 from .problem import Placement, PlacementProblem
 from .search_limits import SolverLimits
-from .solver import solve
+from .solver import solve_instance
 
 MORE = 2  # sensors beyond those of the solution, up to which the front goes
 EFFORT = 0.5  # units of work for each number of sensors
@@ -42,6 +43,7 @@ def front_of(
     chosen = placement.chosen
     most = min(len(chosen) + MORE, len(set(problem.positions[problem.allowed].tolist())))
     found: dict[int, Placement] = {}
+    whole = make_instance(problem)
     for count in range(1, most + 1):
         step = Progress(count - 1, most, "fewer and more sensors", counted=False)
         yield step
@@ -50,7 +52,8 @@ def front_of(
             continue
         try:
             limited = replace(problem, count=count, budget=None)
-            steps = solve(limited, SolverLimits(effort=effort), known=chosen)
+            instance = replace(whole, count=limited.most_sensors, budget=math.inf)
+            steps = solve_instance(limited, instance, SolverLimits(effort=effort), known=chosen)
             found[count] = yield from within(step, steps)
         except SeipError:  # fewer than the constraints demand
             continue

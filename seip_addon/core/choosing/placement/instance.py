@@ -301,11 +301,12 @@ def _needed(
     drop: Boolean = ~(amounts > 0).any(axis=1) & ~mandatory.any(axis=0)
     excluded = conflict | np.eye(len(order), dtype=bool)
     positions, price = problem.positions[order], problem.prices[order]
+    total = amounts.sum(axis=1, dtype=np.float64)
     by_position = np.argsort(positions, kind="stable")
     for group in np.split(by_position, np.flatnonzero(np.diff(positions[by_position])) + 1):
         rank = np.lexsort((group, price[group])).argsort()
         for own, candidate in enumerate(group):
-            others = group[rank < rank[own]]
+            others = group[(rank < rank[own]) & (total[group] >= total[candidate] * (1 - TIE_TOLERANCE))]
             covered = (amounts[others] >= amounts[candidate]).all(axis=1)
             covered &= (mandatory[:, others] >= mandatory[:, [candidate]]).all(axis=0)
             covered &= (excluded[others] <= excluded[candidate]).all(axis=1)

@@ -4,7 +4,7 @@ import difflib
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal, Protocol
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,7 @@ from ...sensing.lidar.carla_dropoff import CarlaDropoff
 from ...sensing.lidar.model import LidarModel
 from ...settings import setting
 from ...site.site import Candidates, Site
+from ..robustness.comparison import Comparison
 from .deployment import BAND, UNRANKED, Deployment, pose_prices
 from .problem import Placement, PlacementConstraints, PlacementProblem
 from .returns_summary import CrossingReturns
@@ -163,11 +164,6 @@ class Objective:
         return Risk(TAILS[usual if self.risk == "auto" else self.risk], self.failures)
 
     @property
-    def weighted(self) -> bool:
-        """Whether this is the weighted problem."""
-        return self.central_weight is not None
-
-    @property
     def cheapest(self) -> bool:
         """Whether this is the reverse problem: the least price for a coverage."""
         return self.coverage is not None
@@ -193,16 +189,6 @@ def criterion_of(objective: Objective, models: Mapping[str, LidarModel]) -> Lite
         return objective.criterion
     range_laws = any(not isinstance(model.law, CarlaDropoff) for model in models.values())
     return "returns" if range_laws and not objective.cheapest and objective.measure is None else "road"
-
-
-class Evaluation(Protocol):
-    """Evaluation of a placement on held-out scenarios."""
-
-    def messages(self) -> tuple[str, ...]:
-        """Return notes on the placement: what it gains over the nominal optimum, and warnings."""
-
-    def summary(self) -> tuple[str, ...]:
-        """Return lines that compare the placement with the nominal optimum."""
 
 
 @dataclass(frozen=True)
@@ -234,10 +220,10 @@ class Solution:
         Objective, with the number of sensors filled in where none was given.
     greedy : Placement or None
         Greedy solution of the same problem; None for the reverse problem and over scenarios.
-    evaluation : Evaluation, optional
-        Evaluation on held-out scenarios, where the placement was optimised over scenarios.
+    evaluation : Comparison, optional
+        Comparison with the nominal optimum on held-out scenarios, where the placement was optimised over scenarios.
     front : tuple of FrontPoint
-        Best placements found with fewer and more sensors; see `price_front`. Empty if they were not searched for.
+        Best placements found with fewer and more sensors; see `front_of`. Empty if they were not searched for.
     crossings : tuple of CrossingReturns
         Expected returns from a pedestrian on each crossing, of all sensors together. Empty if not computed.
     """
@@ -246,7 +232,7 @@ class Solution:
     placement: Placement
     greedy: Placement | None
     deployment: Deployment
-    evaluation: Evaluation | None = None
+    evaluation: Comparison | None = None
     front: tuple[FrontPoint, ...] = ()
     crossings: tuple[CrossingReturns, ...] = ()
 

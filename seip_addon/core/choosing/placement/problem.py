@@ -1,6 +1,7 @@
 """The placement problem and its solution."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -102,7 +103,10 @@ class PlacementConstraints:
         return min(most, max(1, int(affordable)))
 
     def _check_values(self) -> None:
-        _check_size(len(self.prices), len(self.weights))
+        if len(self.prices) == 0:
+            raise SeipError("there is no candidate to choose from; add poles or candidate areas")
+        if len(self.weights) == 0:
+            raise SeipError("there is no target to see; let the region of interest overlap the roads")
         for name, values in (("weight", self.weights), ("price", self.prices)):
             if not np.isfinite(values).all() or (values < 0).any():
                 raise SeipError(f"every {name} must be a finite number of at least 0; correct the {name}s")
@@ -160,11 +164,6 @@ class PlacementProblem(PlacementConstraints):
     g : Concave
         Value of a target by its amount.
 
-    Raises
-    ------
-    SeipError
-        The figures contradict themselves or leave nothing to choose.
-
     Examples
     --------
     >>> problem = PlacementProblem(
@@ -178,10 +177,6 @@ class PlacementProblem(PlacementConstraints):
 
     amounts: NDArray[Any]
     g: Concave = COVERAGE
-
-    def __post_init__(self) -> None:
-        _check_size(*self.amounts.shape)
-        super().__post_init__()
 
     def value(self, chosen: Integer) -> float:
         """Return the objective value of chosen candidates: for coverage, the weight that they cover."""
@@ -221,8 +216,6 @@ class Placement:
         ``optimal`` (proven) or ``feasible``.
     solver : str
         Name and version of the solver.
-    covered : float
-        Weight of the targets that some chosen sensor sees.
     notes : tuple of str
         Notes on the solution, one sentence each.
     """
@@ -233,17 +226,8 @@ class Placement:
     gap: float
     status: str
     solver: str
-    seconds: float
-    covered: float
     price: float
     notes: tuple[str, ...] = ()
-
-
-def _check_size(candidates: int, targets: int) -> None:
-    if candidates == 0:
-        raise SeipError("there is no candidate to choose from; add poles or candidate areas")
-    if targets == 0:
-        raise SeipError("there is no target to see; let the region of interest overlap the roads")
 
 
 def canonical_order(problem: PlacementProblem) -> Integer:
@@ -256,17 +240,14 @@ def canonical_order(problem: PlacementProblem) -> Integer:
 def assess(  # noqa: PLR0913 -- the fields of one record
     problem: PlacementProblem,
     chosen: Integer,
+    objective: float,
     bound: float,
     *,
     optimal: bool,
     solver: str,
-    seconds: float,
-    notes: tuple[str, ...] = (),
-    objective: float | None = None,
+    notes: Sequence[str],
 ) -> Placement:
-    """Return a choice with value, price and certificate; the objective is the value if none is given."""
-    value = problem.value(chosen)
-    objective = value if objective is None else objective
+    """Return a choice with price and certificate."""
     bound = objective if optimal else bound
     return Placement(
         chosen=chosen,
@@ -275,8 +256,6 @@ def assess(  # noqa: PLR0913 -- the fields of one record
         gap=problem.g.gap(objective, bound, math.fsum(problem.weights)),
         status="optimal" if optimal else "feasible",
         solver=solver,
-        seconds=seconds,
-        covered=value,
         price=math.fsum(problem.prices[chosen]),
-        notes=notes,
+        notes=tuple(notes),
     )

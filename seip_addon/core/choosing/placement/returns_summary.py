@@ -4,9 +4,6 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from ...limits import COUNT, Limits
-
-RETURNS = Limits(0.0, COUNT.most)
 FEW_RETURNS = 5.0
 """Number of returns from a pedestrian below which a warning names the crossing."""
 FEW = f"fewer than {FEW_RETURNS:g} returns from a pedestrian"
@@ -85,7 +82,7 @@ class ReturnsSummary:
     crossings : tuple of CrossingReturns
         Returns from a pedestrian at each crossing.
     front : tuple of ReturnsPoint
-        Best placements found with fewer and more sensors, see `returns_front`. Empty if they were not searched for.
+        Best placements found with fewer and more sensors, see `front_of`. Empty if they were not searched for.
 
     Examples
     --------

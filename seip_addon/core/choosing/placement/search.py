@@ -16,12 +16,15 @@ from ...progress import Progress
 from .incumbent import Incumbent
 from .problem import TIE_TOLERANCE
 
-PATIENCE = 80
+PATIENCE = 120
 """Restarts without a better placement after which the search ends, in addition to as many as led to the best one."""
-TOLERATED_LOSS, RETURN = 0.005, 10  # share of the value that a restart may lose; restarts between those from the best
+WALK_LOSS, MIXTURE_LOSS = 0.01, 0.02
+"""Shares of the best value by which the last placement, and that of another mixture of prices, may be worse."""
+RETURN = 10  # restarts between those from the best placement
 FIRST_CHOICES = 20  # candidates of largest gain, one of which begins a restart
 PRICE_POWERS = (0.0, 0.5, 1.0, 1.5)
 """Powers of the price by which gains are divided: different ones lead to different mixtures of prices."""
+RESTART_POWERS = (0.0, 1.0)  # those of restarts
 MAX_PRICES = 8  # different prices that are tried in place of each sensor
 
 Steps = Generator[Progress, None, None]
@@ -63,20 +66,33 @@ class Search:
         yield from self._improved((yield from self.filled(chosen, 0.0)))
 
     def restarts(self, effort: float) -> Steps:
-        """Restart from a part of the best placement until that stops improving it, or for units of work."""
-        incumbent, work = self.incumbent, self.incumbent.work
+        """Restart from a part of a good placement until that stops improving the best one, or for units of work.
+
+        The placement to leave is the last end of swaps, in turn with the best one of some mixture of prices, if these
+        are little worse than the best one of all: so the search moves away from it.
+        """
+        incumbent, work, instance = self.incumbent, self.incumbent.work, self.instance
         last = work.left - effort
         number = best_at = 0
         current = incumbent.chosen
+        mixtures = {self._mixture(current): (incumbent.value, current)}
         while number - best_at < PATIENCE + best_at and work.left > max(last, 0.0):
             number += 1
             before = incumbent.value
             found = yield from self._improved((yield from self._restarted(current)))
-            if incumbent.value > before + self.instance.slack:
+            value = instance.value(found)
+            if incumbent.value > before + instance.slack:
                 best_at = number
-            # A somewhat worse end of swaps is the next one to leave: the search moves away from the best placement.
-            near = self.instance.value(found) >= incumbent.value - TOLERATED_LOSS * abs(incumbent.value)
-            current = found if near and number % RETURN != 0 else incumbent.chosen
+            if value > mixtures.get(self._mixture(found), (-math.inf, found))[0]:
+                mixtures[self._mixture(found)] = value, found
+            walk, mixture = (incumbent.value - share * abs(incumbent.value) for share in (WALK_LOSS, MIXTURE_LOSS))
+            current = found if value >= walk and number % RETURN != 0 else incumbent.chosen
+            if number % 2 and len(self.powers) > 1:
+                good = [one for reached, one in mixtures.values() if reached >= mixture]
+                current = good[self._random.integers(len(good))]
+
+    def _mixture(self, chosen: Integer) -> tuple[float, ...]:
+        return tuple(np.sort(self.instance.price[chosen]).tolist())
 
     def _restarted(self, best: Integer) -> Generator[Progress, None, Integer]:
         """Drop a random part of a placement, add another candidate, and fill up greedily."""
@@ -84,7 +100,7 @@ class Search:
         number = min(len(best), random.integers(1, (len(best) + 1) // 2 + 1, endpoint=True))
         dropped = random.choice(best, number, replace=False) if number else best
         kept = np.setdiff1d(best, dropped)
-        power = self.powers[random.integers(len(self.powers))]
+        power = RESTART_POWERS[random.integers(len(RESTART_POWERS))] if len(self.powers) > 1 else 0.0
         gain = np.where(instance.addable(kept), self._rated(kept, power), -np.inf)
         gain[dropped] = -np.inf
         first = np.argsort(-gain, kind="stable")[:FIRST_CHOICES]

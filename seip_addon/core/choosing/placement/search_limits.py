@@ -10,7 +10,7 @@ from ...acceptance import Acceptance
 from ...errors import SeipError
 
 OPERATIONS_PER_UNIT = 2.5e9  # multiplications that make a unit of work: about a second of one processor core
-OVERHEAD_OPERATIONS = 5e5  # multiplications that take as long as what goes on around each counted step
+OVERHEAD_OPERATIONS = 6e5  # multiplications that take as long as what goes on around each counted step
 DEFAULT_EFFORT = 8.0  # units of work of a search
 
 

@@ -17,7 +17,7 @@ from .branch_and_bound import BranchAndBound
 from .concave import Steps
 from .feasibility import starting_choice
 from .incumbent import Incumbent
-from .instance import make_instance
+from .instance import Instance, make_instance
 from .integer_program import check_solver, is_affordable, prove_by_program
 from .problem import Placement, PlacementProblem, assess
 from .risk import NOMINAL, Risk
@@ -27,7 +27,7 @@ from .search_limits import DEFAULT_LIMITS, SolverLimits, Work
 QUICK_SHARE, GREEDY_SHARE = 0.04, 0.95
 """Shares of what is left for branch and bound by gains only, before and after the restarts."""
 GREEDY_SENSORS = 5  # sensors up to which that often ends with a proof
-RESTART_SHARE = 0.65  # share of what is left for restarts
+RESTART_SHARE = 0.6  # share of what is left for restarts
 SCENARIO_SHARE = 0.3  # the same over scenarios, whose placements begin from the nominal optimum
 ROUNDS = 8  # rounds of fictitious play for the shares of scenarios
 PROGRAM_SHARE = 0.5  # share of what is left then for an integer program
@@ -74,9 +74,21 @@ def solve(
         The constraints cannot be met together, no candidate adds anything, fewer sensors are allowed than the risk
         measure needs, or the solver is not available.
     """
-    check_solver(limits.solver)
     risk.require_sensors(problem.most_sensors)
     instance = make_instance(problem, cases, risk)
+    return (yield from solve_instance(problem, instance, limits, known=known, describe=describe))
+
+
+def solve_instance(
+    problem: PlacementProblem,
+    instance: Instance,
+    limits: SolverLimits = DEFAULT_LIMITS,
+    *,
+    known: Integer | None = None,
+    describe: Describe | None = None,
+) -> Generator[Progress, None, Placement]:
+    """Choose the placement of largest value of a reduced problem; see `solve`."""
+    check_solver(limits.solver)
     incumbent = Incumbent(instance, limits.work(), describe)
     start = yield from starting_choice(problem, instance, limits.solver)
     solver = yield from search_and_prove(incumbent, start, limits.solver, known)
@@ -158,12 +170,11 @@ def placement_of(problem: PlacementProblem, incumbent: Incumbent, solver: str) -
     return assess(
         problem,
         instance.original[chosen],
+        incumbent.value * instance.unit,
         max(incumbent.bound, incumbent.value) * instance.unit,
         optimal=optimal,
         solver=solver,
-        seconds=incumbent.work.seconds,
-        notes=tuple(notes),
-        objective=incumbent.value * instance.unit,
+        notes=notes,
     )
 
 

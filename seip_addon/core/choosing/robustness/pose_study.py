@@ -6,7 +6,7 @@ from the same standard ones, show which kind costs most.
 """
 
 from collections.abc import Generator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -14,36 +14,13 @@ from ...arrays import Float
 from ...estimates import IntervalEstimate, mean_of, quantile_of
 from ...progress import Progress
 from ...sensing.scenarios.pose_errors import ERROR_KINDS, PoseErrors
-from ...sensing.scenarios.scenario_visibility import ScenarioVisibility
-from ...sensing.scenarios.visibility_under_errors import draws_for, visibility_under_errors
+from ...sensing.scenarios.visibility_under_errors import visibility_under_errors
 from ...sensing.visibility.surroundings import Surroundings
 from ..placement.deployment import Deployment
 
 LOW_QUANTILE = 0.05  # quantile of coverage that is reported, and by which placements are compared
 
-NOTABLE_LOSS = 0.01  # share of the targets whose loss, in one of twenty draws, is worth a warning
-
-
-@dataclass(frozen=True)
-class PoseStudySettings:
-    """Settings of a study of pose errors.
-
-    Parameters
-    ----------
-    errors : PoseErrors
-        Standard deviations of the errors.
-    draws : int
-        Number of draws with all kinds of errors.
-    draws_of_kind : int
-        Number of draws with each single kind of error; 0 to leave these out.
-    seed : int
-        Seed of the draws.
-    """
-
-    errors: PoseErrors = field(default_factory=PoseErrors)
-    draws: int = 500
-    draws_of_kind: int = 100
-    seed: int = 0
+NOTABLE_LOSS = 0.01  # share of the targets whose loss is worth a warning: in one of twenty draws, or in traffic
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,16 +39,17 @@ class PoseStudy:
         Coverage in each of m draws with a single kind of error, for each kind.
     """
 
-    settings: PoseStudySettings
+    errors: PoseErrors
     labels: tuple[str, ...]
     planned: float
     together: Float
     alone: tuple[Float, ...]
     by_kind: dict[str, Float]
 
-    def quantile(self, share: float) -> IntervalEstimate:
-        """Estimate a quantile of the coverage."""
-        return quantile_of(self.together, share)
+    @property
+    def low(self) -> IntervalEstimate:
+        """5 % quantile of the coverage."""
+        return quantile_of(self.together, LOW_QUANTILE)
 
     def loss_by_sensor(self) -> tuple[IntervalEstimate, ...]:
         """Estimate the mean loss of coverage if only one sensor has errors, for each sensor."""
@@ -88,9 +66,25 @@ class PoseStudy:
         behind = [self.alone[number] - self.alone[worst] for number in range(len(losses)) if number != worst]
         return self.labels[worst], losses[worst].low > 0 and all(mean_of(difference).low > 0 for difference in behind)
 
+    def warnings(self) -> tuple[str, ...]:
+        """Return a warning if pose errors cost the placement much of its coverage."""
+        return (self.message(),) if self.planned - self.low.value >= NOTABLE_LOSS else ()
+
+    def message(self) -> str:
+        """Return a message on the 5 % quantile of the coverage and the sensor whose errors cost most."""
+        errors, low = self.errors, self.low
+        lost = max(self.planned - low.value, 0.0)
+        worst, certain = self.worst_sensor()
+        which = f"{worst}'s error costs most" if certain else "no sensor's error stands out"
+        return (
+            f"with errors of {errors.position:g} m and {np.degrees(errors.tilt):.3g}° of tilt (standard deviations) "
+            f"the placement covers less than {low.value:.1%} in one of twenty cases, {lost:.1%} less than planned; "
+            f"{which}"
+        )
+
 
 def pose_study(
-    around: Surroundings, deployment: Deployment, settings: PoseStudySettings
+    around: Surroundings, deployment: Deployment, errors: PoseErrors, seed: int, draws: tuple[int, int]
 ) -> Generator[Progress, None, PoseStudy]:
     """Compute the coverage of a placement under draws of pose errors.
 
@@ -98,47 +92,26 @@ def pose_study(
     ----------
     deployment : Deployment
         Placement at candidate poses of the site.
+    draws : (int, int)
+        Number of draws with all kinds of errors, and with each single kind; 0 to leave the latter out.
     """
-    poses = np.array([sensor.pose for sensor in deployment.sensors if sensor.pose is not None], dtype=np.int64)
-    every = np.arange(len(poses))
+    poses = np.array([sensor.pose for sensor in deployment.sensors], dtype=np.int64)
+    every, planned = np.arange(len(poses)), deployment.rows
 
-    def views(errors: PoseErrors, draws: int) -> Generator[Progress, None, ScenarioVisibility]:
-        drawn = draws_for(around, poses, errors, draws, settings.seed)
-        return (yield from visibility_under_errors(around, poses, drawn))
-
-    planned = (yield from views(PoseErrors(0.0, 0.0, 0.0, 0.0), 1)).seen(0)
-    together = yield from views(settings.errors, settings.draws)
+    together = yield from visibility_under_errors(around, poses, errors, draws[0], seed)
     by_kind = {}
     for kind in ERROR_KINDS:
-        if settings.draws_of_kind and getattr(settings.errors, kind) > 0:
-            of_kind = yield from views(settings.errors.alone(kind), settings.draws_of_kind)
+        if draws[1] and getattr(errors, kind) > 0:
+            of_kind = yield from visibility_under_errors(around, poses, errors.alone(kind), draws[1], seed)
             by_kind[kind] = of_kind.seen_by_any(every).mean(axis=1)
     return PoseStudy(
-        settings=settings,
+        errors=errors,
         labels=tuple(sensor.label for sensor in deployment.sensors),
-        planned=float(planned.any(axis=0).mean()),
+        planned=deployment.coverage,
         together=together.seen_by_any(every).mean(axis=1),
         alone=tuple(
-            (np.delete(planned, number, axis=0).any(axis=0) | together.seen_by_pose(number)).mean(axis=1)
-            for number in every
+            (np.delete(planned, one, axis=0).any(axis=0) | together.seen_by_any(every[[one]])).mean(axis=1)
+            for one in every
         ),
         by_kind=by_kind,
-    )
-
-
-def pose_warnings(study: PoseStudy) -> tuple[str, ...]:
-    """Return a warning if pose errors cost a placement much of its coverage."""
-    lost = study.planned - study.quantile(LOW_QUANTILE).value
-    return (pose_message(study),) if lost >= NOTABLE_LOSS else ()
-
-
-def pose_message(study: PoseStudy) -> str:
-    """Return a message on the 5 % quantile of a placement's coverage and the sensor whose errors cost most."""
-    errors, low = study.settings.errors, study.quantile(LOW_QUANTILE)
-    lost = max(study.planned - low.value, 0.0)
-    worst, certain = study.worst_sensor()
-    which = f"{worst}'s error costs most" if certain else "no sensor's error stands out"
-    return (
-        f"with errors of {errors.position:g} m and {np.degrees(errors.tilt):.3g}° of tilt (standard deviations) the "
-        f"placement covers less than {low.value:.1%} in one of twenty cases, {lost:.1%} less than planned; {which}"
     )

@@ -655,7 +655,7 @@ def _settings(evidence: Evidence) -> Iterator[tuple[str, str]]:
         asked = f"{what}{limits_of(goal, 'with')}"
     chosen_for = purpose(record.notes)
     yield "Asked for", f"{asked}{f', chosen{chosen_for}' if chosen_for else ''}"
-    rules = ["the road in weighted regions counts more"] if goal.weighted else []
+    rules = ["the road in weighted regions counts more"] if goal.central_weight is not None else []
     rules += [f"sensors at least {goal.min_distance:g} m apart"] if goal.min_distance > 0 else []
     rules += [f"a sensor at {name}" for name in goal.mandatory] + [f"no sensor at {name}" for name in goal.forbidden]
     if rules:

@@ -268,14 +268,9 @@ class PlacementRecord:
         """Rows of the visibility grid of the sensors at candidate poses, (k,) int64."""
         return np.array([sensor.pose for sensor in self.sensors if sensor.pose is not None], dtype=np.int64)
 
-    def placement(self, covered: float) -> Placement:
-        """Return the placement that `placement_record` wrote down.
-
-        Parameters
-        ----------
-        covered : float
-            Weight of the targets that some sensor sees, which records hold as a share only.
-        """
+    @property
+    def placement(self) -> Placement:
+        """The placement that `placement_record` wrote down."""
         found = self.objective
         return Placement(
             chosen=self.poses,
@@ -284,8 +279,6 @@ class PlacementRecord:
             gap=math.inf if found.gap is None else found.gap,
             status=found.status,
             solver=found.solver,
-            seconds=self.times.durations_s.get("placement", 0.0),
-            covered=covered,
             price=self.price_usd,
             notes=self.notes,
         )
@@ -348,7 +341,7 @@ def placement_record(
             gain_band=deployment.gain_band and _rounded_band(deployment.gain_band),
         ),
         objective=RecordedObjective(
-            kind=_kind(solution),
+            kind="vanilla" if solution.objective.central_weight is None else "weighted",
             sought=_sought(solution),
             value=_significant(placement.objective),
             bound=_found(placement.bound),
@@ -425,10 +418,6 @@ def _sensor(sensor: Sensor, site: Site) -> RecordedSensor:
 def _rounded_band(band: GainBand) -> GainBand:
     types = tuple(TypeBand(one.sensor, _share(one.low), _share(one.high)) for one in band.types)
     return replace(band, low=_share(band.low), high=_share(band.high), types=types)
-
-
-def _kind(solution: Solution) -> Literal["vanilla", "weighted"]:
-    return "weighted" if solution.objective.weighted else "vanilla"
 
 
 def _sought(solution: Solution) -> Literal["most coverage", "most returns", "least price"]:

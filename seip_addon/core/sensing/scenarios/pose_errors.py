@@ -19,9 +19,8 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from ...arrays import Boolean, Float
+from ...arrays import Float
 from ...errors import SeipError
-from ...geometry.orientation import orientations
 from ...settings import setting
 from ...site.obstruction import inside_any
 from ...site.scene_geometry import Mesh
@@ -81,38 +80,7 @@ class PoseErrors:
 ERROR_KINDS = tuple(field.name for field in fields(PoseErrors))
 
 
-@dataclass(frozen=True, eq=False)
-class PoseDraws:
-    """Poses of s sensors in n draws of errors.
-
-    Parameters
-    ----------
-    shift : (n, s, 3) float64, metres
-        Errors of the positions.
-    yaw, pitch, roll : (n, s) float64, radians
-        Errors of the angles.
-    """
-
-    shift: Float
-    yaw: Float
-    pitch: Float
-    roll: Float
-
-    def __len__(self) -> int:
-        return len(self.shift)
-
-    def orientations(self, planned_yaw: Float, planned_tilt: Float) -> Float:
-        """Return the orientations of sensors, (n, s, 3, 3) float64, from their axes to the site's.
-
-        Parameters
-        ----------
-        planned_yaw, planned_tilt : (s,) float64, radians
-            Angles without errors.
-        """
-        return orientations(planned_yaw + self.yaw, planned_tilt + self.pitch, self.roll)
-
-
-def draw_errors(errors: PoseErrors, foot: Float, draws: int, seed: int) -> PoseDraws:
+def draw_errors(errors: PoseErrors, foot: Float, draws: int, seed: int) -> Float:
     """Draw random pose errors of sensors.
 
     The errors of a sensor depend only on the seed, the number of the draw and the sensor's position. They do not depend
@@ -125,12 +93,17 @@ def draw_errors(errors: PoseErrors, foot: Float, draws: int, seed: int) -> PoseD
         Ground point of each sensor's position; equal ones have equal errors.
     draws, seed : int
         Number of draws, at least 1, and a seed of at least 0; see `Scenarios`.
+
+    Returns
+    -------
+    (draws, s, 6) float64
+        Errors of x, y and z in metres, and of yaw, pitch and roll in radians.
     """
     positions, of_position = np.unique(np.rint(foot / _MICROMETRE).astype(np.int64), axis=0, return_inverse=True)
     standard = np.stack([_standard_normal(seed, position, draws) for position in positions.tolist()], axis=1)
     scale = [errors.position, errors.position, errors.height, errors.yaw, errors.tilt, errors.tilt]
-    drawn = standard[:, of_position.ravel()] * np.array(scale)
-    return PoseDraws(drawn[..., :3], *np.moveaxis(drawn[..., 3:], -1, 0))
+    drawn: Float = standard[:, of_position.ravel()] * np.array(scale)
+    return drawn
 
 
 def _standard_normal(seed: int, position: Sequence[int], draws: int) -> Float:
@@ -140,19 +113,19 @@ def _standard_normal(seed: int, position: Sequence[int], draws: int) -> Float:
     return np.random.default_rng(words).standard_normal((draws, _KINDS_DRAWN))
 
 
-def out_of_objects(draws: PoseDraws, xyz: Float, objects: Sequence[Mesh]) -> PoseDraws:
+def out_of_objects(drawn: Float, xyz: Float, objects: Sequence[Mesh]) -> Float:
     """Move sensors that a draw puts inside an object to the opposite side, or, if that fails, to the planned position.
 
     Parameters
     ----------
+    drawn : (n, s, 6) float64
+        Errors; see `draw_errors`.
     xyz : (s, 3) float64, metres
         Planned positions.
     """
-    shift = draws.shift.copy()
-    blocked: Boolean = inside_any((xyz + shift).reshape(-1, 3), objects).reshape(shift.shape[:-1])
-    shift[blocked] *= -1
-    still = np.zeros_like(blocked)
-    where = np.broadcast_to(xyz, shift.shape)
-    still[blocked] = inside_any(where[blocked] + shift[blocked], objects)
-    shift[still] = 0.0
-    return replace(draws, shift=shift)
+    drawn = drawn.copy()
+    shift = drawn[..., :3]
+    for factor in (-1.0, 0.0):
+        inside = inside_any((xyz + shift).reshape(-1, 3), objects).reshape(shift.shape[:-1])
+        shift[inside] *= factor
+    return drawn

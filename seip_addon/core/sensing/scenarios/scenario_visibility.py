@@ -38,10 +38,6 @@ class ScenarioVisibility:
         """Return V in one scenario, (s, t) bool."""
         return np.unpackbits(self.packed[number], axis=1, count=self.targets).view(bool)
 
-    def seen_by_pose(self, pose: int) -> Boolean:
-        """Return the targets that one pose sees in each scenario, (n, t) bool."""
-        return np.unpackbits(self.packed[:, pose], axis=1, count=self.targets).view(bool)
-
     def seen_by_each(self, poses: Integer) -> NDArray[np.uint8]:
         """Return the targets that some poses see in each scenario, (n, s, t) uint8."""
         return np.unpackbits(self.packed[:, poses], axis=2, count=self.targets)
@@ -50,12 +46,6 @@ class ScenarioVisibility:
         """Return the targets that at least one of some poses sees in each scenario, (n, t) bool."""
         joined = np.bitwise_or.reduce(self.packed[:, poses], axis=1)
         return np.unpackbits(joined, axis=1, count=self.targets).view(bool)
-
-    def spread_to(self, poses: Integer, number: int) -> ScenarioVisibility:
-        """Return the visibility of ``number`` poses: these become ``poses``, and the others see nothing."""
-        packed = np.zeros((len(self), number, self.packed.shape[2]), dtype=np.uint8)
-        packed[:, poses] = self.packed
-        return ScenarioVisibility(packed, self.targets)
 
 
 def each_in_threads(

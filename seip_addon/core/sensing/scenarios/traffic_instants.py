@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -65,16 +65,19 @@ class Instants:
     def __len__(self) -> int:
         return len(self.time)
 
+    def snapshots(self) -> Iterator[tuple[Trajectories, Snapshot]]:
+        """Yield the run of each instant and the road users present."""
+        for run, time in zip(self.run.tolist(), self.time.tolist(), strict=True):
+            yield self.runs[run], self.runs[run].at(time)
+
     def obstacles(self) -> list[TrafficObstacles]:
         """Return the bodies present at each instant."""
-        return [
-            obstacles_of(self.runs[run], self.runs[run].at(time))
-            for run, time in zip(self.run.tolist(), self.time.tolist(), strict=True)
-        ]
+        return [obstacles_of(run, snapshot) for run, snapshot in self.snapshots()]
 
-    def of(self, which: Integer) -> Instants:
-        """Return some of the instants."""
-        return Instants(self.runs, self.run[which], self.time[which], self.batch[which])
+    @property
+    def road_users(self) -> float:
+        """Mean number of road users present."""
+        return float(np.mean([len(snapshot) for _, snapshot in self.snapshots()]))
 
 
 def spread_instants(runs: Sequence[Trajectories], number: int, seed: int) -> Instants:

@@ -5,33 +5,29 @@ from collections.abc import Generator
 import numpy as np
 
 from ...arrays import Integer
+from ...geometry.orientation import orientations
 from ...progress import Progress
 from ..visibility.chunks import sharing_rays
 from ..visibility.ray_casting import engine_name, make_ray_caster
 from ..visibility.surroundings import Surroundings
 from ..visibility.visibility_model import VisibilityModel
-from .pose_errors import PoseDraws, PoseErrors, draw_errors, out_of_objects
+from .pose_errors import PoseErrors, draw_errors, out_of_objects
 from .scenario_visibility import ScenarioVisibility, each_in_threads
 
 
-def draws_for(around: Surroundings, poses: Integer, errors: PoseErrors, draws: int, seed: int) -> PoseDraws:
-    """Draw errors of some of a site's poses that put no sensor inside an object; see `out_of_objects`."""
-    candidates = around.site.candidates
-    drawn = draw_errors(errors, candidates.position[candidates.position_of[poses]], draws, seed)
-    return out_of_objects(drawn, candidates.xyz[poses], around.objects)
-
-
 def visibility_under_errors(
-    around: Surroundings, poses: Integer, draws: PoseDraws
+    around: Surroundings, poses: Integer, errors: PoseErrors, draws: int, seed: int
 ) -> Generator[Progress, None, ScenarioVisibility]:
     """Compute visibility from poses under draws of errors; sensors of several types at one position share rays.
+
+    No draw puts a sensor inside an object; see `out_of_objects`.
 
     Parameters
     ----------
     poses : (s,) int64
         Indices among the site's candidates.
-    draws : PoseDraws
-        Errors of these poses in n draws; poses at one position must have equal errors.
+    draws, seed : int
+        Number of draws and their seed; see `draw_errors`.
 
     Yields
     ------
@@ -45,16 +41,18 @@ def visibility_under_errors(
     caster = make_ray_caster(site.triangles, engine_name(around.engine))
     model = VisibilityModel(site.targets.xyz, site.reflectivity, around.sight, caster)
     together = sharing_rays(xyz, yaw, tilt)
-    packed = np.zeros((len(draws), len(poses), (len(site.targets) + 7) // 8), dtype=np.uint8)
-    orientations = draws.orientations(yaw, tilt)
+    packed = np.zeros((draws, len(poses), (len(site.targets) + 7) // 8), dtype=np.uint8)
+    drawn = draw_errors(errors, candidates.position[candidates.position_of[poses]], draws, seed)
+    drawn = out_of_objects(drawn, xyz, around.objects)
+    rotations = orientations(yaw + drawn[..., 3], tilt + drawn[..., 4], drawn[..., 5])
 
     def compute(work: tuple[int, Integer]) -> None:
         draw, members = work
         first = members[0]
-        where, rotated = xyz[first] + draws.shift[draw, first], orientations[draw, first]
+        where, rotated = xyz[first] + drawn[draw, first, :3], rotations[draw, first]
         seen, _ = model.see_all([models[keys[member]] for member in members], where, rotated)
         packed[draw, members] = np.packbits(seen, axis=1)
 
-    works = [(draw, members) for draw in range(len(draws)) for members in together]
+    works = [(draw, members) for draw in range(draws) for members in together]
     yield from each_in_threads(compute, works, caster.threads, "computing visibility under pose errors")
     return ScenarioVisibility(packed, len(site.targets))

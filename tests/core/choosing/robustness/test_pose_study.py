@@ -7,7 +7,7 @@ from headless.studies.stability.robustness_rows import pose_rows, poses_converge
 import pytest
 
 from seip_addon.core.choosing.placement.deployment import deploy
-from seip_addon.core.choosing.robustness.pose_study import PoseStudySettings, pose_study, pose_warnings
+from seip_addon.core.choosing.robustness.pose_study import pose_study
 from seip_addon.core.progress import finish
 from seip_addon.core.sensing.lidar.catalogue import load_catalogue
 from seip_addon.core.sensing.scenarios.pose_errors import ERROR_KINDS, PoseErrors
@@ -20,30 +20,17 @@ from tests.engines import ANY
 MODELS = load_catalogue()
 
 
-@pytest.fixture(scope="module")
-def placed():
-    site = junction_site(positions=16, sensors=("type1",), heights=(5.4,), spacing=3.0)
-    grid = finish(compute_visibility(site, MODELS, VisibilitySettings(delta=2.0), ANY))
-    return site, deploy(site, MODELS, grid.rows([0, 5]), [0, 5])
-
-
-def study_of(placed, **changed):
-    site, deployment = placed
-    chosen = PoseStudySettings(**{"draws": 40, "draws_of_kind": 10} | changed)
-    return finish(pose_study(around(site), deployment, chosen))
-
-
-def around(site):
-    return Surroundings(site, MODELS, VisibilitySettings(delta=2.0), engine=ANY)
-
-
 @pytest.mark.slow
-def test_a_study_says_who_is_to_blame(placed):
-    study = study_of(placed, errors=PoseErrors(tilt=math.radians(8)))
+def test_a_study_says_who_is_to_blame():
+    site = junction_site(positions=16, sensors=("type1",), heights=(5.4,), spacing=3.0)
+    around = Surroundings(site, MODELS, VisibilitySettings(delta=2.0), engine=ANY)
+    grid = finish(compute_visibility(site, MODELS, around.sight, ANY))
+    deployment = deploy(site, MODELS, grid.rows([0, 5]), [0, 5])
+    study = finish(pose_study(around, deployment, PoseErrors(tilt=math.radians(8)), seed=0, draws=(40, 10)))
     assert set(study.by_kind) == set(ERROR_KINDS)
     assert study.together.shape == (40,)
     losses = dict(zip(study.labels, study.loss_by_sensor(), strict=True))
     assert study.worst_sensor()[0] == max(losses, key=lambda label: losses[label].value)
-    assert pose_warnings(study)
+    assert study.warnings()
     assert len(pose_rows(study)) == 3
     assert poses_converged(study)

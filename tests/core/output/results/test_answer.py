@@ -27,8 +27,6 @@ def record():
         gap=0.0,
         status="optimal",
         solver="HiGHS",
-        seconds=0.5,
-        covered=500.0,
         price=0.0,
         notes=(),
     )

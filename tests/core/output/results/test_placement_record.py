@@ -24,7 +24,7 @@ SCHEMA = json.loads(FILE.read_text(encoding="utf-8"))
 
 
 def solution(chosen, **values) -> Placement:
-    more = {"status": "feasible", "solver": "HiGHS", "seconds": 0.5, "covered": values["objective"], "price": 0.0}
+    more = {"status": "feasible", "solver": "HiGHS", "price": 0.0}
     return Placement(chosen=np.array(chosen), notes=("3 suffice",), **{**more, **values})
 
 

@@ -19,7 +19,7 @@ from seip_addon.core.progress import finish
 from seip_addon.core.sensing.lidar.catalogue import load_catalogue
 from seip_addon.core.sensing.lidar.range_equation import RangeEquation
 from seip_addon.core.sensing.scans.sensor import level_orientation
-from seip_addon.core.sensing.scenarios.pose_errors import PoseDraws
+from seip_addon.core.sensing.scenarios.pose_errors import PoseErrors
 from seip_addon.core.sensing.scenarios.visibility_under_errors import visibility_under_errors
 from seip_addon.core.sensing.visibility import grid
 from seip_addon.core.sensing.visibility.grid import (
@@ -228,8 +228,8 @@ def test_visibility_without_errors_is_the_grid_whatever_hangs_at_one_place():
     together = replace(poses, xyz=np.repeat(poses.xyz[:1], 4, axis=0), yaw=np.full(4, 0.3), tilt=poses.tilt)
     together = replace(together, tilt=np.array([0.0, 0.0, 0.4, 0.4]))
     site = replace(site, candidates=together)
-    nothing = PoseDraws(np.zeros((1, 4, 3)), *(np.zeros((1, 4)) for _ in range(3)))
-    views = finish(visibility_under_errors(Surroundings(site, MODELS, SIGHT, (), ANY), np.arange(4), nothing))
+    around, nothing = Surroundings(site, MODELS, SIGHT, (), ANY), PoseErrors(0.0, 0.0, 0.0, 0.0)
+    views = finish(visibility_under_errors(around, np.arange(4), nothing, draws=1, seed=0))
     assert (views.seen(0) == grid_of(site).visible).all()
     assert (views.seen(0)[0] != views.seen(0)[2]).any()
 

@@ -10,10 +10,10 @@ from seip_addon.core.choosing.placement.objective import Objective, placement_pr
 from seip_addon.core.choosing.placement.risk import Risk
 from seip_addon.core.choosing.placement.scenarios import Scenarios
 from seip_addon.core.choosing.placement.search_limits import SolverLimits
-from seip_addon.core.choosing.robustness.robust_study import robust_placements, robust_study
+from seip_addon.core.choosing.robustness.robust_problem import RobustProblem
 from seip_addon.core.progress import finish
 from seip_addon.core.sensing.lidar.catalogue import load_catalogue
-from seip_addon.core.sensing.scenarios.visibility_under_errors import draws_for, visibility_under_errors
+from seip_addon.core.sensing.scenarios.visibility_under_errors import visibility_under_errors
 from seip_addon.core.sensing.visibility.grid import VisibilitySettings, compute_visibility
 from seip_addon.core.sensing.visibility.surroundings import Surroundings
 from tests.builders.synthetic_junction import junction_site
@@ -36,15 +36,12 @@ def laid_out():
 LOSSES = [Risk(failure="worst"), Risk(tail=0.5, failure="worst"), Risk(tail=0.0, failure="mean")]
 
 
-@pytest.fixture(scope="module")
-def study_of_losses(laid_out):
-    placements = finish(robust_placements(*laid_out, SCENARIOS, LOSSES, LIMITS))
-    return finish(robust_study(*laid_out, SCENARIOS, placements))
-
-
 @pytest.mark.slow
-def test_placements_are_evaluated_by_the_outcome_they_were_chosen_for(laid_out, study_of_losses):
+def test_placements_are_evaluated_by_the_outcome_they_were_chosen_for(laid_out):
     around, problem = laid_out
+    robust = RobustProblem(around, problem, SCENARIOS)
+    comparisons = finish(robust.compare(*finish(robust.placements(LOSSES, LIMITS))))
+    assert comparisons[0].nominal is comparisons[1].nominal is not comparisons[2].nominal
 
     def outcome(view, risk):
         assert len(view) == problem.count
@@ -55,14 +52,14 @@ def test_placements_are_evaluated_by_the_outcome_they_were_chosen_for(laid_out, 
     @cache
     def looks(*chosen):
         poses = np.array(chosen)
-        drawn = draws_for(around, poses, SCENARIOS.pose_errors, SCENARIOS.evaluated, SCENARIOS.seed + 1)
-        return finish(visibility_under_errors(around, poses, drawn))
+        sample = SCENARIOS.pose_errors, SCENARIOS.evaluated, SCENARIOS.seed + 1
+        return finish(visibility_under_errors(around, poses, *sample))
 
-    for contender, risk in zip(study_of_losses.robust, LOSSES, strict=True):
-        for evaluated in (contender, study_of_losses.beside(contender)):
+    for comparison, risk in zip(comparisons, LOSSES, strict=True):
+        for evaluated in (comparison.robust, comparison.nominal):
             chosen = evaluated.placement.chosen
             views = looks(*chosen.tolist())
             expected = [outcome(views.seen(draw), risk) for draw in range(SCENARIOS.evaluated)]
-            assert evaluated.unseen == pytest.approx(expected, abs=1e-12)
-            assert evaluated.undisturbed == pytest.approx(outcome(problem.amounts[chosen], risk), abs=1e-12)
-        assert (contender.unseen < contender.planned).any()
+            assert evaluated.held_out == pytest.approx(expected, abs=1e-12)
+            assert evaluated.nominal == pytest.approx(outcome(problem.amounts[chosen], risk), abs=1e-12)
+        assert (comparison.robust.held_out < comparison.robust.planned).any()

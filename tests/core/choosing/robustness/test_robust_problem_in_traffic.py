@@ -3,13 +3,15 @@
 import math
 from dataclasses import replace
 
-from headless.studies.stability.robustness_rows import traffic_rows
+from headless.studies.stability.robustness_rows import hidden, traffic_rows
 
 import numpy as np
 import pytest
 
 from seip_addon.core.choosing.placement.objective import Objective, placement_problem
-from seip_addon.core.choosing.robustness.traffic_study import traffic_placements, traffic_scenarios, traffic_study
+from seip_addon.core.choosing.placement.risk import Risk
+from seip_addon.core.choosing.placement.scenarios import Scenarios
+from seip_addon.core.choosing.robustness.robust_problem import RobustProblem
 from seip_addon.core.progress import finish
 from seip_addon.core.sensing.lidar.catalogue import load_catalogue
 from seip_addon.core.sensing.scenarios.traffic_instants import spread_instants
@@ -50,59 +52,54 @@ def laid_out():
 
 
 @pytest.fixture(scope="module")
-def study(laid_out):
-    around, problem = laid_out
-    scenarios = finish(traffic_scenarios(around, problem, spread_instants([queue(1), queue(2)], 6, 0)))
-    placements = finish(traffic_placements(problem, scenarios))
-    return scenarios, finish(traffic_study(around, problem, placements, 6, spread_instants([queue(3)], 8, 1)))
+def comparison(laid_out):
+    scenarios = Scenarios("traffic", count=6, held_out=8)
+    robust = RobustProblem(*laid_out, scenarios, ([queue(1), queue(2)], [queue(3)]))
+    return finish(robust.compare(*finish(robust.placements([Risk()]))))[0]
 
 
 @pytest.mark.slow
-def test_both_are_evaluated_at_instants_that_nothing_was_chosen_on(laid_out, study):
-    around, _ = laid_out
-    _, found = study
-    evaluated = spread_instants([queue(3)], 8, 1)
-    for placed in (found.empty, found.traffic):
-        views = finish(visibility_in_traffic(around, placed.placement.chosen, evaluated.obstacles()))
-        rows = np.array([views.seen(instant).any(axis=0) for instant in range(8)])
-        assert placed.at == pytest.approx(rows.mean(axis=1), abs=1e-12)
-        assert placed.time == pytest.approx(rows.mean(axis=0), abs=1e-12)
-        assert placed.hidden_at == pytest.approx((placed.empty_targets & ~rows).mean(axis=1), abs=1e-12)
-        assert placed.hidden.value == pytest.approx(placed.hidden_at.mean() / placed.empty, abs=1e-12)
-        assert placed.hidden.value * placed.empty >= placed.loss.value - 1e-12
-
-
-def test_on_the_instants_that_it_was_chosen_on_it_loses_to_none(laid_out, study):
+def test_both_are_evaluated_at_instants_that_nothing_was_chosen_on(laid_out, comparison):
     around, problem = laid_out
-    scenarios, found = study
+    evaluated = spread_instants([queue(3)], 8, 1)
+    for placed in (comparison.nominal, comparison.robust):
+        chosen = placed.placement.chosen
+        views = finish(visibility_in_traffic(around, chosen, evaluated.obstacles()))
+        rows = np.array([views.seen(instant).any(axis=0) for instant in range(8)])
+        empty = problem.amounts[chosen].any(axis=0)
+        assert (placed.seen == [empty, *rows]).all()
+        assert placed.held_out == pytest.approx(rows.mean(axis=1), abs=1e-12)
+        assert placed.nominal == pytest.approx(empty.mean(), abs=1e-12)
+        assert hidden(placed).value == pytest.approx((empty & ~rows).mean() / placed.nominal, abs=1e-12)
+        assert hidden(placed).value * placed.nominal >= placed.loss.value - 1e-12
+
+
+def test_on_the_instants_that_it_was_chosen_on_it_loses_to_none(laid_out, comparison):
+    around, _ = laid_out
     instants = spread_instants([queue(1), queue(2)], 6, 0)
-    assert (scenarios.packed[1] == look(around, problem, instants.of(np.array([0])))).all()
 
     def mean(placed):
-        return scenarios.seen_by_any(placed.placement.chosen)[1:].mean()
+        views = finish(visibility_in_traffic(around, placed.placement.chosen, instants.obstacles()))
+        return views.seen_by_any(np.arange(2)).mean()
 
-    assert mean(found.traffic) >= mean(found.empty) - 1e-12
-    assert found.traffic.placement.objective == pytest.approx(mean(found.traffic) * len(around.site.targets))
-
-
-def look(around, problem, instants):
-    return finish(traffic_scenarios(around, problem, instants)).packed[1]
+    robust = comparison.robust
+    assert mean(robust) >= mean(comparison.nominal) - 1e-12
+    assert robust.placement.objective == pytest.approx(mean(robust) * len(around.site.targets))
 
 
-def test_it_says_what_traffic_hides(study):
-    _, found = study
-    seen = found.empty
-    costly = replace(found, empty=replace(seen, at=np.full_like(seen.at, seen.empty - 0.02)))
+def test_it_says_what_traffic_hides(comparison):
+    seen = comparison.nominal
+    costly = replace(comparison, nominal=replace(seen, held_out=np.full_like(seen.held_out, seen.nominal - 0.02)))
     assert any("2.0% less" in sentence for sentence in costly.messages())
-    nothing = replace(seen, at=np.full_like(seen.at, seen.empty - 0.004))
-    quiet = replace(found, empty=nothing, traffic=nothing)
+    nothing = replace(seen, held_out=np.full_like(seen.held_out, seen.nominal - 0.004))
+    quiet = replace(comparison, nominal=nothing, robust=nothing)
     assert quiet.messages()[1:] == ()
-    other = replace(nothing, placement=replace(found.traffic.placement, chosen=np.array([0, 1])))
-    doubtful = replace(quiet, traffic=other)
+    other = replace(nothing, placement=replace(comparison.robust.placement, chosen=np.array([0, 1])))
+    doubtful = replace(quiet, robust=other)
     assert ["not significantly better" in sentence for sentence in doubtful.messages()[1:]] == [True]
-    gains = replace(quiet, traffic=replace(other, at=nothing.at + 0.1))
+    gains = replace(quiet, robust=replace(other, held_out=nothing.held_out + 0.1))
     assert gains.messages()[1:] == ()
-    rows = traffic_rows(found)
+    rows = traffic_rows(comparison)
     assert "24 road users at a time" in rows[0].regime
-    assert f"vehicles hide {seen.hidden.describe()}" in rows[0].begins
-    assert f", {found.gain.as_change()}" in rows[1].begins
+    assert f"vehicles hide {hidden(seen).describe()}" in rows[0].begins
+    assert f", {comparison.gain.as_change()}" in rows[1].begins
