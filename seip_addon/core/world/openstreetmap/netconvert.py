@@ -8,7 +8,9 @@ from ...errors import SeipError
 from ...progress import Progress
 from ...sumo_programs import find_sumo, run
 from .connecting_roads import mended_text
-from .streets import JOIN_DISTANCE, SIDEWALK_WIDTH, StreetFile
+from .edge_lines import moved_edges
+from .street_lanes import SIDEWALK_WIDTH
+from .streets import JOIN_DISTANCE, StreetFile
 
 _SOURCE = re.compile(r'\s*<userData code="sumoId" value="([^"]*)"/>')
 _ROAD = re.compile(r'<road [^>]*?id="([^"]*)"')
@@ -44,16 +46,19 @@ def convert(
     if programs.home is None:
         raise SeipError("SUMO's data files were not found near its programs: set SUMO_HOME to the folder with them")
     types = ",".join(str(programs.home / "data" / "typemap" / name) for name in TYPE_FILES)
-    options: list[object] = [
-        *("--osm-files", source, "--opendrive-output", target, "--type-files", types),
-        *("--geometry.remove", "--ramps.guess", "--junctions.join", "--junctions.join-dist", JOIN_DISTANCE),
-        *("--tls.guess-signals", "--tls.discard-simple", "--tls.join", "--no-turnarounds"),
-        *("--osm.sidewalks", "--default.sidewalk-width", SIDEWALK_WIDTH, "--crossings.guess"),
-        *("--junctions.corner-detail", 5, "--output.street-names", "--output.original-names"),
+    network, lines = (target.with_suffix(suffix) for suffix in (".net.xml", ".edg.xml"))
+    common = [
+        *("--no-turnarounds", "--output.street-names", "--output.original-names"),
         *("--no-warnings", "--xml-validation", "never", "--aggregate-warnings", 1),
     ]
+    options: list[object] = [
+        *("--osm-files", source, "--output-file", network, "--precision", 6, "--type-files", types),
+        *("--geometry.remove", "--ramps.guess", "--junctions.join", "--junctions.join-dist", JOIN_DISTANCE),
+        *("--tls.guess-signals", "--tls.discard-simple", "--tls.join"),
+        *("--osm.sidewalks", "--default.sidewalk-width", SIDEWALK_WIDTH, *common),
+    ]
     if streets.left_hand:
-        options += ["--lefthand", "--opendrive-output.lefthand-left"]
+        options += ["--lefthand"]
     # netconvert would join the ends of slip lanes of any length, and the ends of bridges with junctions below them
     apart = sorted(streets.structures.ends.union(streets.slip_ends, *streets.roundabouts))
     if apart:
@@ -72,6 +77,17 @@ def convert(
     if kept:
         options += ["--geometry.remove.keep-edges.explicit", ",".join(kept)]
     yield from run(programs, programs.netconvert, options, "streets of the extract")
+    # Lanes move to their places in a second run, with the junctions of the first: which nodes netconvert joins to one
+    # junction depends on the shapes of the edges between them.
+    moved = yield from moved_edges(network, streets.ways, left_hand=streets.left_hand)
+    lines.write_text("\n".join(["<edges>", *moved, "</edges>", ""]), encoding="utf-8")
+    options = ["--sumo-net-file", network, "--edge-files", lines, "--opendrive-output", target, *common]
+    options += ["--crossings.guess", "--junctions.corner-detail", 5]
+    if streets.left_hand:
+        options += ["--lefthand", "--opendrive-output.lefthand-left"]
+    yield from run(programs, programs.netconvert, options, "lanes of the extract")
+    network.unlink()
+    lines.unlink()
     text = _corrected(target.read_text(encoding="utf-8"), left_hand=streets.left_hand)
     sources = _sources(text)
     target.write_text(mended_text(_SOURCE.sub("", text)), encoding="utf-8")
@@ -99,5 +115,7 @@ def _corrected(text: str, *, left_hand: bool) -> str:
     # Roads within junctions have no street name; netconvert writes SUMO's internal id (":12_0") in its place, which
     # would appear in results as the name of a street.
     text = re.sub(r'(<road [^>]*?)name=":[^"]*"', r'\1name=""', text)
+    # Lanes that only some vehicles may use are restricted ones; in streets of an extract these are lanes of buses.
+    text = text.replace('type="restricted"', 'type="bus"')
     # netconvert writes no rule of traffic, and OpenDRIVE's default is right-hand traffic.
     return text.replace("<road ", '<road rule="LHT" ') if left_hand else text

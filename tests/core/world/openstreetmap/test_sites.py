@@ -6,6 +6,7 @@ import re
 import numpy as np
 import pytest
 import shapely
+import shapely.affinity
 
 from seip_addon.core import sumo_programs
 from seip_addon.core.errors import SeipError
@@ -13,6 +14,7 @@ from seip_addon.core.progress import finish
 from seip_addon.core.site.roles import Role
 from seip_addon.core.workflows.site_building import SiteRequest, build_site
 from seip_addon.core.world.opendrive.read import read_map
+from seip_addon.core.world.openstreetmap.site import place_on_map
 from tests.builders.osm_text import (
     JUNCTIONS,
     Extract,
@@ -126,6 +128,47 @@ def test_traffic_on_the_left_is_in_the_map(tmp_path):
     pavement = plan(site.model, "Pavement")
     assert pavement.intersects(shapely.box(-9, 40, -3, 60))  # north along North Road the left is the west
     assert not pavement.intersects(shapely.box(3.6, 40, 9, 60))
+
+
+ARMS = {
+    "five lanes and two": ({"lanes": 7, "lanes:forward": 5, "sidewalk": "right"}, (-11.2, 11.2), (-11.2, 11.2)),
+    "drawn against its traffic": ({"oneway": "-1", "lanes": 3, "sidewalk": "left"}, (-4.8, 4.8), (-4.8, 4.8)),
+    "one lane for both directions": ({"lanes": 1}, (-1.75, 1.75), (-1.75, 1.75)),
+    "buses against the traffic": ({"oneway": "yes", "oneway:bus": "no", "lanes": 2}, (-3.2, 3.2), (-3.2, 3.2)),
+    "cycle lane against the traffic": (
+        {"oneway": "yes", "cycleway": "opposite_lane", "lanes": 1},
+        (-0.85, 2.35),
+        (-2.35, 0.85),
+    ),
+    "line at the first lane": ({"oneway": "yes", "lanes": 3, "placement": "right_of:1"}, (-3.2, 6.4), (-3.2, 6.4)),
+    "pavement on one side": ({"oneway": "yes", "lanes": 2, "sidewalk": "left"}, (-3.2, 3.2), (-3.2, 3.2)),
+    "unknown class": ({"highway": "road"}, (-3.2, 3.2), (-3.2, 3.2)),
+}
+"""Arms of two crossings: their tags, and from where to where their lanes reach to the right of the line of the way,
+metres, in right-hand and left-hand traffic."""
+
+
+@pytest.mark.parametrize("left", [False, True])
+@pytest.mark.parametrize("first", [0, 4])
+def test_lanes_lie_about_the_lines_of_their_ways(left, first, tmp_path):
+    extract = Extract(51.5, -0.1) if left else Extract()
+    middle = extract.node(0, 0)
+    arms = list(ARMS.values())[first : first + 4]
+    ends = [(300, 0), (0, 300), (-300, 0), (0, -300)]
+    for number, ((tags, *_), end) in enumerate(zip(arms, ends, strict=True)):
+        extract.way([middle, end], **({"highway": "secondary", "name": f"Arm {number}"} | tags))
+    site = built(extract, tmp_path)
+    driving = shapely.affinity.translate(plan(site.model, "Driving lanes"), *site.model.origin[:2])
+    path = tmp_path / "streets.xodr"
+    path.write_text(site.map_text, encoding="utf-8")
+    road_map = read_map(path)
+    for (_, *expected), (x, y) in zip(arms, ends, strict=True):
+        inner, outer = (place_on_map(road_map, extract.place(share * x, share * y)) for share in (0.2, 0.25))
+        along = np.subtract(outer, inner) / np.hypot(*np.subtract(outer, inner))
+        right = np.array([along[1], -along[0]])
+        across = driving.intersection(shapely.LineString([outer - 30 * right, outer + 30 * right]))
+        reach = (shapely.get_coordinates(across) - outer) @ right
+        assert (reach.min(), reach.max()) == pytest.approx(expected[left], abs=0.03)
 
 
 def test_a_place_can_be_named_by_its_streets(tmp_path):
