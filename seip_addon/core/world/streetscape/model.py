@@ -99,6 +99,7 @@ MAX_GROUND_DISTANCE = 300.0  # largest distance of ground from the extent (metre
 VERGE_SPACING = 12.0
 KERB_STEP, RELIEF_SPACING = 2.5, 6.0  # metres: fine enough for errors of some centimetres on uneven ground
 OVERLAY_SPACING = 4.0  # metres, as for junctions: coarser overlays would cut through the coverage on curved roads
+MIN_PASSAGE = 2.0  # metres above the ground from which on a building leaves room for ways below
 MIN_BRIDGE_HEIGHT = 1.0  # metres above the land from which a road on a bridge is in the air
 MIN_RAMP_HEIGHT = 1.0  # metres above the nearest studied road from which a ramp of another level is in the way
 MIN_WALL = 0.02  # metres: sum of the heights at both ends above which a gap next to a lower road gets a wall
@@ -941,7 +942,8 @@ def _side_way_parts(
 ) -> tuple[list[Part], tuple[str, ...]]:
     """Return ways next to the road by kind, without areas of lanes, buildings and other roads, and notes."""
     lanes = road_surface.lane_outline(street.lanes)
-    standing: list[Building | PlacedSolid] = [*description.buildings, *description.solids]
+    on_ground = [one for one in description.buildings if one.base < MIN_PASSAGE]
+    standing: list[Building | PlacedSolid] = [*on_ground, *description.solids]
     houses = shapely.union_all([one.outline for one in standing])
     covered = [lanes, street.roadside.filled, layers.area, houses, street.crossing.area]
     taken = shapely.union_all(covered).buffer(road_surface.MAX_SEAM)
