@@ -30,7 +30,7 @@ from .description import MAX_COVERED, Building, PlacedSolid, Poles, SideWay, Sit
 from .footways import without_doubles
 from .geographic_position import in_metres
 from .intersections import without_plain_joints
-from .levels import MIN_LEVEL_HEIGHT, Levels
+from .levels import MIN_LEVEL_HEIGHT, UNNAMED_ROAD, Levels
 from .map_furniture import (
     CROWN_SHARE,
     POLE_HEIGHT,
@@ -292,7 +292,8 @@ def site_model(road_map: RoadMap, description: SiteDescription) -> Generator[Pro
     seen = _sight_area(street.region, parts)
     occluders = [part for part in (*furniture.parts, *other_levels) if Role.OCCLUDERS in part.roles]
     bare = () if any(_hides(part, seen) for part in occluders) else (NO_OBSTACLES_MESSAGE,)
-    warnings = road_warnings(road_map, (*street.lanes, *street.crossing.lanes), names, origin)
+    unnamed = UNNAMED_ROAD if description.from_centre_lines else ""
+    warnings = road_warnings(road_map, (*street.lanes, *street.crossing.lanes), names, origin, unnamed)
     yield next(stages)
     return SiteModel(
         name=description.name or _map_title(road_map.name, description.junction),

@@ -20,7 +20,7 @@ MAX_NAMED = 3  # places in a message at most
 
 
 def road_warnings(
-    road_map: RoadMap, lanes: Sequence[LaneSurface], names: Mapping[str, str], origin: Float
+    road_map: RoadMap, lanes: Sequence[LaneSurface], names: Mapping[str, str], origin: Float, unnamed: str = ""
 ) -> tuple[str, ...]:
     """Return warnings of steep carriageways and of steps between connected lanes, one sentence each.
 
@@ -32,10 +32,13 @@ def road_warnings(
         Names of the streets by the ids of their roads.
     origin : (3,) float64, metres
         Map coordinates of the local origin.
+    unnamed : str
+        Name of roads without one; empty for their ids, which mean nothing in a map made of an extract.
     """
     driven = in_groups(lanes, CARRIAGEWAY)
-    steep = _worst(steep_places(driven), names, origin, "up to {:.1%} ")
-    gaps = _worst(height_gaps(road_map, driven), names, origin, "{:.2f} m ")
+    called = {road.id: names.get(road.id) or unnamed or f"road {road.id}" for road in road_map.roads}
+    steep = _worst(steep_places(driven), called, origin, "up to {:.1%} ")
+    gaps = _worst(height_gaps(road_map, driven), called, origin, "{:.2f} m ")
     messages = []
     if steep:
         messages.append(
@@ -110,7 +113,7 @@ def _worst(places: Iterator[tuple[float, str, Float]], names: Mapping[str, str],
     """Return the worst place of each street as a text, worst streets first."""
     found: dict[str, tuple[float, Float]] = {}
     for size, road, place in places:
-        name = names.get(road) or f"road {road}"
+        name = names[road]
         if size > found.get(name, (0.0, place))[0]:
             found[name] = (size, place)
     ordered = sorted(found.items(), key=lambda one: (-one[1][0], one[0]))

@@ -20,6 +20,7 @@ from .demand import Demand, write_routes
 from .street_network import PARKED_CLASS, StreetNetwork, read_network
 
 STEP_SECONDS = 0.1  # seconds between two steps of the simulation
+MIN_LANE_WIDTH = 1.0  # metres
 SAMPLING_SECONDS = 0.2  # seconds between two samples of the trajectories
 _LANE_CHANGE_SECONDS = 4.0  # seconds; without it SUMO's vehicles jump from lane to lane
 _MAX_SIGNAL_DISTANCE = 60.0  # metres, largest distance of a crosswalk from its traffic light
@@ -150,7 +151,9 @@ def _network(
         *("--tls.green.time", signals.green, "--tls.yellow.time", signals.amber, "--tls.allred.time", signals.all_red),
         *("--crossings.guess", "true", "--crossings.guess.speed-threshold", 0),
     ]
-    lanes = ["--opendrive.import-all-lanes", "true", "--type-files", types, "--tls.guess", "true"]
+    # netconvert closes lanes below a least width, such as the two halves of one lane for both directions.
+    narrow = ["--opendrive.min-width", MIN_LANE_WIDTH, "--opendrive.import-all-lanes", "true"]
+    lanes = [*narrow, "--type-files", types, "--tls.guess", "true"]
     source = ["--opendrive-files", map_path, *lanes, "--output-file", plain]
     yield from run(programs, programs.netconvert, [*source, *common], "reading the map")
     whole = read_network(plain)
