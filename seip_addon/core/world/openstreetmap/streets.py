@@ -187,38 +187,79 @@ def _with_lanes_of_neighbours(extract: Extract, *, service: bool) -> Extract:
 
     Such a piece would narrow the street to one lane in each direction for the length of a junction.
     """
-    ways = dict(extract.ways)
-    streets = {number: way for number, way in ways.items() if is_street(way.tags, service=service)}
-    ends: dict[int, list[int]] = {}
+    streets = {
+        number: way
+        for number, way in extract.ways.items()
+        if "highway" in way.tags and is_street(way.tags, service=service) and len(way.nodes) > 1
+    }
+    at: dict[int, list[int]] = {}
     for number, way in streets.items():
-        for end in {way.nodes[0], way.nodes[-1]} if len(way.nodes) > 1 else ():
-            ends.setdefault(end, []).append(number)
-    for number, way in streets.items():
-        if "highway" not in way.tags or has_lane_count(way.tags) or implausible_lanes(way.tags):
-            continue
-        line = _in_metres(extract, extract.line(way))
-        if not 2 <= len(line) == len(way.nodes) or np.hypot(*np.diff(line, axis=0).T).sum() > SHORT_PIECE:
-            continue
-        found = [
-            [tags for other in ends[end] if other != number and (tags := _lanes_onward(way, streets[other], end))]
-            for end in (way.nodes[0], way.nodes[-1])
-        ]
-        if all(found):
-            # The wider neighbour: a lane too many is a taper, and one too few is a post in a lane.
-            widest = max(itertools.chain(*found), key=lambda tags: sum(lane_counts(tags).values()))
-            ways[number] = replace(way, tags={**widest, **way.tags})
-    return replace(extract, ways=ways)
+        for end in {way.nodes[0], way.nodes[-1]}:
+            at.setdefault(end, []).append(number)
+
+    def onward(number: int, end: int) -> list[int]:
+        way = streets[number]
+        return [other for other in at[end] if other != number and _continues(way, streets[other], end)]
+
+    ends = {
+        number: [onward(number, end) for end in (way.nodes[0], way.nodes[-1])]
+        for number, way in streets.items()
+        if not has_lane_count(way.tags) and not implausible_lanes(way.tags) and _is_short(extract, way)
+    }
+    # A chain of short pieces counts if both of its ends lead on to pieces with lanes.
+    left: set[int] | None = None
+    while left is None or left:
+        left = {
+            number
+            for number, around in ends.items()
+            if not all(any(one in ends or has_lane_count(streets[one].tags) for one in side) for side in around)
+        }
+        ends = {number: around for number, around in ends.items() if number not in left}
+    while ends:
+        given = {
+            number: [
+                _lanes_along(streets[number], streets[other])
+                for other in itertools.chain(*around)
+                if has_lane_count(streets[other].tags)
+            ]
+            for number, around in ends.items()
+        }
+        # The wider neighbour: a lane too many is a taper, and one too few is a post in a lane.
+        for number, options in given.items():
+            if options:
+                widest = max(options, key=lambda tags: sum(lane_counts(tags).values()))
+                streets[number] = replace(streets[number], tags={**widest, **streets[number].tags})
+                del ends[number]
+        if not any(given.values()):
+            break
+    return replace(extract, ways={**extract.ways, **streets})
 
 
-def _lanes_onward(way: Way, other: Way, end: int) -> Tags | None:
-    """Return the tags for lanes of the street that continues a way at its end, seen along the way; None without one."""
-    is_same = way.tags.get("name") == other.tags.get("name") and is_one_way(way.tags) == is_one_way(other.tags)
-    if not is_same or "highway" not in other.tags or not has_lane_count(other.tags):
-        return None
+def _is_short(extract: Extract, way: Way) -> bool:
+    """Return whether a way is no longer than `SHORT_PIECE`; False if the extract lacks one of its nodes."""
+    line = _in_metres(extract, extract.line(way))
+    return len(line) == len(way.nodes) and float(np.hypot(*np.diff(line, axis=0).T).sum()) <= SHORT_PIECE
+
+
+def _is_against(way: Way, other: Way) -> bool:
+    """Return whether two ways with a common end are drawn towards each other, or away from each other."""
+    return way.nodes[0] == other.nodes[0] or way.nodes[-1] == other.nodes[-1]
+
+
+def _continues(way: Way, other: Way, end: int) -> bool:
+    """Return whether a street continues another one, which ends at a node, in driving direction."""
+    one_way = is_one_way(way.tags)
     against = (way.nodes[0] == end) == (other.nodes[0] == end)
-    if against and is_one_way(way.tags):
-        return None
-    tags = reversed_tags(other.tags) if against else dict(other.tags)
+    return (
+        way.tags.get("name") == other.tags.get("name")
+        and one_way == is_one_way(other.tags)
+        and not (one_way and against)
+    )
+
+
+def _lanes_along(way: Way, other: Way) -> Tags:
+    """Return the tags for lanes of a street that continues a way, seen along that way."""
+    tags = reversed_tags(other.tags) if _is_against(way, other) else dict(other.tags)
     kept = {key: value for key, value in tags.items() if key.partition(":")[0] in ("lanes", "width", "placement")}
     counts = {f"lanes:{direction}": str(number) for direction, number in lane_counts(tags).items()}
     return kept if "lanes" in kept else kept | counts

@@ -1,5 +1,7 @@
 """Which ways are streets, and what netconvert is told of them."""
 
+import itertools
+
 import pytest
 from defusedxml.ElementTree import fromstring
 
@@ -62,19 +64,26 @@ def test_lane_widths_from_left_to_right_in_driving_direction(tmp_path, left_hand
 
 
 @pytest.mark.parametrize(
-    ("length", "reverse", "lanes"),
-    [(12, False, ("2", "2")), (12, True, ("2", "2")), (60, False, ("1", "1"))],
+    ("cuts", "reverse", "lanes"),
+    [
+        ((0, 12), False, ["2 2"]),
+        ((0, 12), True, ["2 2"]),
+        ((0, 12, 20, 40), False, ["2 1", "2 2", "2 2"]),
+        ((0, 60), False, ["1 1"]),
+    ],
 )
-def test_short_piece_without_lanes_has_those_of_its_wider_neighbour(tmp_path, length, reverse, lanes):
+def test_short_pieces_without_lanes_have_those_of_the_wider_neighbour(tmp_path, cuts, reverse, lanes):
     extract = Extract()
     usual = {"highway": "primary", "name": "Long Street"}
     extract.way([(-100, 0), (0, 0)], lanes=3, lanes__forward=2, **usual)
-    piece = [(0, 0), (length, 0)]
-    extract.way(piece[::-1] if reverse else piece, **usual)
-    extract.way([(length, 0), (200, 0)], lanes=4, **usual)
-    result, ways, _ = streets(extract, tmp_path)
-    assert (ways[1]["lanes:forward"], ways[1]["lanes:backward"]) == lanes
-    assert len(result.widened) == (length == 12)
+    extract.way([(cuts[-1], 0), (200, 0)], turn__lanes__forward="left|", turn__lanes__backward="left|", **usual)
+    for piece in itertools.pairwise([(x, 0) for x in cuts]):
+        extract.way(piece[::-1] if reverse else piece, **usual)
+    extract.way([(-100, 0), (-100, 10)], **usual)  # with lanes at one end only
+    result, (_, _, *ways, alone), _ = streets(extract, tmp_path)
+    assert [f"{way['lanes:forward']} {way['lanes:backward']}" for way in ways] == lanes
+    assert len(result.widened) == len(ways) * (lanes != ["1 1"])
+    assert alone["lanes"] == "2"
 
 
 @pytest.mark.parametrize(
