@@ -477,9 +477,11 @@ def _first_bytes(path: Path) -> bytes:
     """Return the first bytes of a file, after a check that they are not those of another format."""
     try:
         with path.open("rb") as file:
-            start = file.read(16)
+            start = file.read(1000)
     except OSError:
         return b""  # the reader names the fault
+    if b'"CityJSON"' in start:
+        raise SeipError(f"{path.name} is CityJSON, a model of buildings, not an extract: choose an .osm file")
     for mark, cure in _OTHER_FORMATS.items():
         if start.lstrip(b"\xef\xbb\xbf \t\r\n" if mark == b"{" else b"").startswith(mark):
             raise SeipError(f"{path.name} {cure}")
