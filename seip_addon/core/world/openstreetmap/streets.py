@@ -495,20 +495,21 @@ class _Medians:
         steps = np.diff(line, axis=0)
         if not len(steps):
             return False, False
-        # Cast a ray to each side from the middle of the longest segment, away from junctions at the ends. It starts at
-        # 2 m, so as not to meet the street itself.
-        longest = int(np.argmax(np.hypot(*steps.T)))
-        middle, along = (line[longest] + line[longest + 1]) / 2, steps[longest] / (np.hypot(*steps[longest]) or 1.0)
-        aside = np.array([-along[1], along[0]])
+        # Cast a ray to each side from the middle of each segment: where carriageways part around a refuge, they are
+        # parallel for a few metres only. It starts at 2 m, so as not to meet the street itself.
         found = [False, False]
-        for side, sign in enumerate((1.0, -1.0)):
-            ray = shapely.linestrings(np.stack([middle + 2.0 * sign * aside, middle + MAX_MEDIAN * sign * aside]))
-            for index in self._tree.query(ray, predicate="intersects"):
-                # The other carriageway has the same name and leads the opposite way, within 37 degrees (cosine below
-                # -0.8). A parallel one-way street of the same direction does not make the space between them a median.
-                ahead = self._stop[index] - self._start[index]
-                opposite = float(ahead @ along) < -0.8 * float(np.hypot(*ahead))
-                found[side] |= opposite and self._names[index] == way.tags.get("name", "")
+        for start, step in zip(line, steps, strict=False):
+            middle, along = start + step / 2, step / (np.hypot(*step) or 1.0)
+            aside = np.array([-along[1], along[0]])
+            for side, sign in enumerate((1.0, -1.0)):
+                ray = shapely.linestrings(np.stack([middle + 2.0 * sign * aside, middle + MAX_MEDIAN * sign * aside]))
+                for index in self._tree.query(ray, predicate="intersects"):
+                    # The other carriageway has the same name and leads the opposite way, within 37 degrees (cosine
+                    # below -0.8). A parallel one-way street of the same direction does not make the space between them
+                    # a median.
+                    ahead = self._stop[index] - self._start[index]
+                    opposite = float(ahead @ along) < -0.8 * float(np.hypot(*ahead))
+                    found[side] |= opposite and self._names[index] == way.tags.get("name", "")
         return found[0], found[1]
 
     def _line(self, way: Way) -> Float:

@@ -112,6 +112,13 @@ def test_a_dual_carriageway_has_pavements_at_its_outer_sides(tmp_path, backward)
     assert [way["sidewalk"] for way in ways] == ["right", "right", "both"]
 
 
+def test_no_pavement_on_a_refuge_between_the_lanes_of_a_street(tmp_path):
+    extract = Extract()
+    for points in ([(0, 0), (3, -4), (6, -4), (9, -4), (20, 0)], [(20, 0), (9, 4), (6, 4), (3, 4), (0, 0)]):
+        extract.way(points, highway="secondary", oneway="yes", name="Split Street")
+    assert [way["sidewalk"] for way in streets(extract, tmp_path)[1]] == ["right", "right"]
+
+
 def test_a_roundabout_shows_the_side_and_stays_whole(tmp_path):
     result, ways, _ = streets(roundabout(), tmp_path)
     assert not result.left_hand
