@@ -10,11 +10,11 @@ import shapely.affinity
 
 from seip_addon.core import sumo_programs
 from seip_addon.core.errors import SeipError
+from seip_addon.core.geometry.geo_reference import projection
 from seip_addon.core.progress import finish
 from seip_addon.core.site.roles import Role
 from seip_addon.core.workflows.site_building import SiteRequest, build_site
 from seip_addon.core.world.opendrive.read import read_map
-from seip_addon.core.world.openstreetmap.site import place_on_map
 from tests.builders.osm_text import (
     JUNCTIONS,
     Extract,
@@ -147,16 +147,16 @@ def test_lanes_lie_about_the_lines_of_their_ways(left, first, tmp_path):
     ends = [(300, 0), (0, 300), (-300, 0), (0, -300)]
     for number, ((tags, *_), end) in enumerate(zip(arms, ends, strict=True)):
         extract.way([middle, end], **({"highway": "secondary", "name": f"Arm {number}"} | tags))
-    site = built(extract, tmp_path)
-    driving = shapely.affinity.translate(plan(site.model, "Driving lanes"), *site.model.origin[:2])
-    assert ('rule="LHT"' in site.map_text) is left
-    assert plan(site.model, "Pavements").intersection(plan(site.model, "Driving lanes")).area < 1.0
-    path = tmp_path / "streets.xodr"
-    path.write_text(site.map_text, encoding="utf-8")
-    road_map = read_map(path)
+    model = built(extract, tmp_path).model
+    driving = shapely.affinity.translate(plan(model, "Driving lanes"), *model.origin[:2])
+    assert plan(model, "Pavements").intersection(plan(model, "Driving lanes")).area < 1.0
+    to_map = projection(model.geo_reference)
     for (_, *expected), (x, y) in zip(arms, ends, strict=True):
-        inner, outer = (place_on_map(road_map, extract.place(share * x, share * y)) for share in (0.2, 0.25))
-        along = np.subtract(outer, inner) / np.hypot(*np.subtract(outer, inner))
+        inner, outer = (
+            np.array(to_map(*np.radians(extract.place(share * x, share * y)))) - model.header_offset[:2]
+            for share in (0.2, 0.25)
+        )
+        along = (outer - inner) / np.hypot(*(outer - inner))
         right = np.array([along[1], -along[0]])
         across = driving.intersection(shapely.LineString([outer - 30 * right, outer + 30 * right]))
         reach = (shapely.get_coordinates(across) - outer) @ right
