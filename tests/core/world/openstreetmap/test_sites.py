@@ -150,6 +150,8 @@ def test_lanes_lie_about_the_lines_of_their_ways(left, first, tmp_path):
     model = built(extract, tmp_path).model
     driving = shapely.affinity.translate(plan(model, "Driving lanes"), *model.origin[:2])
     assert plan(model, "Pavements").intersection(plan(model, "Driving lanes")).area < 1.0
+    noted = "one lane serves both directions of Arm 2, as the extract gives one lane in all"
+    assert (noted in model.notes) is (first == 0)
     to_map = projection(model.geo_reference)
     for (_, *expected), (x, y) in zip(arms, ends, strict=True):
         inner, outer = (

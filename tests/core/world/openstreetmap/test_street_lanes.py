@@ -2,7 +2,7 @@
 
 import pytest
 
-from seip_addon.core.world.openstreetmap.street_lanes import divider_offset, has_lane_count, lane_counts, shares_lane
+from seip_addon.core.world.openstreetmap.street_lanes import divider_offset, has_lane_count, lane_counts
 
 TWO_WAY = {"highway": "primary"}
 ONE_WAY = {"highway": "primary", "oneway": "yes"}
@@ -53,19 +53,6 @@ def test_number_of_lanes(tags, lanes):
 )
 def test_whether_the_extract_gives_the_number_of_lanes(tags, known):
     assert has_lane_count(tags) is known
-
-
-@pytest.mark.parametrize(
-    ("tags", "shared"),
-    [
-        (TWO_WAY | {"lanes": "1"}, True),
-        (ONE_WAY | {"lanes": "1"}, False),
-        (TWO_WAY | {"lanes": "1", "lanes:forward": "1", "lanes:backward": "1"}, False),
-        (TWO_WAY, False),
-    ],
-)
-def test_single_lane_for_both_directions(tags, shared):
-    assert shares_lane(tags) is shared
 
 
 @pytest.mark.parametrize(
