@@ -68,7 +68,10 @@ def _without_twins(area: BaseGeometry) -> BaseGeometry:
     """
     corners = np.unique(shapely.get_coordinates(area), axis=0)
     apart = np.unique(np.round(corners / _TWIN_DISTANCE), axis=0)
-    return area if len(apart) == len(corners) else shapely.set_precision(area, _TWIN_DISTANCE)
+    if len(apart) == len(corners):
+        return area
+    # A union on a grid may touch itself in a corner, which is not valid and cannot be rounded again.
+    return shapely.set_precision(area if area.is_valid else area.buffer(0), _TWIN_DISTANCE)
 
 
 def covered_share(area: BaseGeometry, others: shapely.STRtree) -> float:

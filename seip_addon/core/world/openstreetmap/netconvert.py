@@ -7,8 +7,10 @@ from pathlib import Path
 from ...errors import SeipError
 from ...progress import Progress
 from ...sumo_programs import find_sumo, run
+from .edge_lines import moved_edges
 from .network_map import PRECISION
-from .streets import JOIN_DISTANCE, SIDEWALK_WIDTH, StreetFile
+from .street_lanes import SIDEWALK_WIDTH
+from .streets import JOIN_DISTANCE, StreetFile
 
 TYPE_FILES = ("osmNetconvert.typ.xml", "osmNetconvertBicycle.typ.xml")
 
@@ -36,13 +38,16 @@ def convert(
     if programs.home is None:
         raise SeipError("SUMO's data files were not found near its programs: set SUMO_HOME to the folder with them")
     types = ",".join(str(programs.home / "data" / "typemap" / name) for name in TYPE_FILES)
-    options: list[object] = [
-        *("--osm-files", source, "--output-file", target, "--type-files", types),
-        *("--geometry.remove", "--ramps.guess", "--junctions.join", "--junctions.join-dist", JOIN_DISTANCE),
-        *("--tls.guess-signals", "--tls.discard-simple", "--tls.join", "--no-turnarounds"),
-        *("--osm.sidewalks", "--default.sidewalk-width", SIDEWALK_WIDTH, "--crossings.guess"),
-        *("--junctions.corner-detail", 5, "--output.street-names", "--precision", PRECISION),
+    first, lines = (target.with_name(f"{target.name}.{kind}.xml") for kind in ("first", "edg"))
+    common = [
+        *("--no-turnarounds", "--output.street-names"),
         *("--no-warnings", "--xml-validation", "never", "--aggregate-warnings", 1),
+    ]
+    options: list[object] = [
+        *("--osm-files", source, "--output-file", first, "--precision", 6, "--type-files", types),
+        *("--geometry.remove", "--ramps.guess", "--junctions.join", "--junctions.join-dist", JOIN_DISTANCE),
+        *("--tls.guess-signals", "--tls.discard-simple", "--tls.join"),
+        *("--osm.sidewalks", "--default.sidewalk-width", SIDEWALK_WIDTH, *common),
     ]
     if streets.left_hand:
         options += ["--lefthand"]
@@ -64,6 +69,15 @@ def convert(
     if kept:
         options += ["--geometry.remove.keep-edges.explicit", ",".join(kept)]
     yield from run(programs, programs.netconvert, options, "streets of the extract")
+    # Lanes move to their places in a second run, with the junctions of the first: which nodes netconvert joins to one
+    # junction depends on the shapes of the edges between them.
+    moved = yield from moved_edges(first, streets.ways, left_hand=streets.left_hand)
+    lines.write_text("\n".join(["<edges>", *moved, "</edges>", ""]), encoding="utf-8")
+    options = ["--sumo-net-file", first, "--edge-files", lines, "--output-file", target, "--precision", PRECISION]
+    options += [*common, "--crossings.guess", "--junctions.corner-detail", 5, *["--lefthand"] * streets.left_hand]
+    yield from run(programs, programs.netconvert, options, "lanes of the extract")
+    first.unlink()
+    lines.unlink()
     # The first comment holds the time of the run and the paths of its files. With it the same streets would give
     # different bytes each time, and results that carry a digest of the map would be stale.
     text = target.read_text(encoding="utf-8")

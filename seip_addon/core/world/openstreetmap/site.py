@@ -37,22 +37,13 @@ from .netconvert import convert
 from .network_map import NetworkMap, read_network_map
 from .plan_shapes import PlanShapes
 from .signals import SIGNAL_REACH
+from .street_lanes import has_lane_count, has_widths, implausible_lanes, lane_counts, shares_lane, usual_lanes
 from .street_objects import surroundings
-from .streets import (
-    CLASSES,
-    StreetFile,
-    has_lane_count,
-    has_widths,
-    implausible_lanes,
-    is_street,
-    is_tunnel,
-    lane_counts,
-    shown_name,
-    usual_lanes,
-    write_streets,
-)
+from .streets import CLASSES, SHORT_PIECE, StreetFile, is_street, is_tunnel, shown_name, write_streets
 
-EXTRACT_SUFFIXES = (".osm", ".osm.gz", ".osm.pbf", ".osm.xml")
+EXTRACT_SUFFIXES = (".osm", ".osm.gz", ".osm.xml", ".pbf")
+OTHER_SUFFIXES = (".json", ".geojson", ".osc", ".osc.gz", ".osm.bz2", ".osm.zip")
+"""Suffixes of OpenStreetMap data in formats that `read_extract` refuses with the cure."""
 STREET_REACH = 450.0  # metres beyond the region within which streets are laid out: traffic comes from there
 MAX_JUNCTION_DISTANCE = 60.0  # metres from a requested place to its junction at most
 NAMES = ("name", "name:en", "alt_name", "ref")
@@ -106,8 +97,8 @@ class ExtractPlace:
 
 
 def is_extract(path: Path) -> bool:
-    """Return whether a file name is that of an extract."""
-    return path.name.lower().endswith((*EXTRACT_SUFFIXES, ".pbf"))
+    """Return whether a file name is that of an extract, or of OpenStreetMap data in a format that is not supported."""
+    return path.name.lower().endswith((*EXTRACT_SUFFIXES, *OTHER_SUFFIXES))
 
 
 @dataclass(frozen=True, eq=False)
@@ -241,6 +232,7 @@ def site_of_extract(
         *extract.notes,
         *source.notes,
         *_assumed_lanes(near_streets),
+        *_lane_notes(near_streets, source.widened),
         *_implausible_lanes(near_streets),
         *_tunnel_notes(tunnels),
         *_assumed_crossings(guessed_crossings(streets, extent.seen)),
@@ -393,18 +385,36 @@ def _assumed_widths(ways: Iterable[Way]) -> frozenset[str]:
     return frozenset({"sidewalk", "biking"}) if known else frozenset({"sidewalk", "biking", "driving"})
 
 
+def _names(ways: Iterable[Way]) -> str:
+    """Return the names of streets for a note, in alphabetical order."""
+    unnamed = "streets without a name"
+    names = {{**way.tags, **shown_name(way.tags)}.get("name", unnamed) for way in ways}
+    known = sorted(names, key=lambda name: (name == unnamed, name))
+    return ", ".join(known[:MAX_NAMED]) + (f" and {len(known) - MAX_NAMED} more" * (len(known) > MAX_NAMED))
+
+
 def _assumed_lanes(ways: Iterable[Way]) -> Iterator[str]:
     """Yield notes on streets without a number of lanes in the extract."""
-    streets: dict[int, list[str]] = {}
+    streets: dict[int, list[Way]] = {}
     for way in ways:
         if "highway" in way.tags and not has_lane_count(way.tags) and not implausible_lanes(way.tags):
-            name = {**way.tags, **shown_name(way.tags)}.get("name", "streets without a name")
-            streets.setdefault(usual_lanes(way.tags), []).append(name)
-    for lanes, names in sorted(streets.items()):
-        known = list(dict.fromkeys(sorted(names, key=lambda name: (name == "streets without a name", name))))
-        listed = ", ".join(known[:MAX_NAMED]) + (f" and {len(known) - MAX_NAMED} more" * (len(known) > MAX_NAMED))
+            streets.setdefault(usual_lanes(way.tags), []).append(way)
+    for lanes, found in sorted(streets.items()):
         each = "one lane is" if lanes == 1 else f"{lanes} lanes are"
-        yield f"{each} assumed in each direction of streets without a number of lanes in the extract: {listed}"
+        yield f"{each} assumed in each direction of streets without a number of lanes in the extract: {_names(found)}"
+
+
+def _lane_notes(ways: Sequence[Way], widened: Collection[Way]) -> Iterator[str]:
+    """Yield notes on pieces with the lanes of their neighbours, and on streets with one lane for both directions."""
+    pieces = [way for way in ways if way in widened]
+    shared = [way for way in ways if "highway" in way.tags and shares_lane(way.tags)]
+    if pieces:
+        yield (
+            f"pieces shorter than {SHORT_PIECE:g} m without a number of lanes have those of their neighbours: "
+            f"{_names(pieces)}"
+        )
+    if shared:
+        yield f"one lane serves both directions of {_names(shared)}, as the extract gives one lane in all"
 
 
 def _implausible_lanes(ways: Iterable[Way]) -> Iterator[str]:

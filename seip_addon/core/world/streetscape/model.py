@@ -28,7 +28,7 @@ from .clearing import MAX_IN_LANE, clear
 from .description import MAX_COVERED, Building, PlacedSolid, Poles, SideWay, SiteDescription, Slab, Trees, Wall
 from .geographic_position import in_metres
 from .intersections import enclosed, ring_roads
-from .levels import MIN_LEVEL_HEIGHT, Levels
+from .levels import MIN_LEVEL_HEIGHT, UNNAMED_ROAD, Levels
 from .map_furniture import (
     CROWN_SHARE,
     POLE_HEIGHT,
@@ -66,6 +66,7 @@ MAX_GROUND_DISTANCE = 300.0  # largest distance of ground from the extent (metre
 VERGE_SPACING = 12.0
 KERB_STEP, RELIEF_SPACING = 2.5, 6.0  # metres: fine enough for errors of some centimetres on uneven ground
 OVERLAY_SPACING = 4.0  # metres, as for junctions: coarser overlays would cut through the coverage on curved roads
+MIN_PASSAGE = 2.0  # metres above the ground from which on a building leaves room for ways below
 MIN_BRIDGE_HEIGHT = 1.0  # metres above the land from which a road on a bridge is in the air
 MIN_RAMP_HEIGHT = 1.0  # metres above the nearest studied road from which a ramp of another level is in the way
 MIN_WALL = 0.02  # metres: sum of the heights at both ends above which a gap next to a lower road gets a wall
@@ -266,7 +267,8 @@ def street_model(streets: StreetMap, description: SiteDescription) -> Generator[
     seen = _sight_area(street.region, parts)
     occluders = [part for part in (*furniture.parts, *other_levels) if Role.OCCLUDERS in part.roles]
     bare = () if any(_hides(part, seen) for part in occluders) else (NO_OBSTACLES_MESSAGE,)
-    warnings = road_warnings(road_map, (*street.lanes, *street.crossing.lanes), names, origin)
+    unnamed = UNNAMED_ROAD if description.from_centre_lines else ""
+    warnings = road_warnings(road_map, (*street.lanes, *street.crossing.lanes), names, origin, unnamed)
     return SiteModel(
         name=description.name or _map_title(road_map.name, description.junction),
         origin=origin,
@@ -562,7 +564,8 @@ def _surroundings(
     others = _strips(levels.others, origin, extent, relief, kerbs=False)
     areas, houses = None, NOTHING
     if streets.junctions:
-        outlines = [one.outline for one in description.buildings] + [one.outline for one in description.solids]
+        outlines = [one.outline for one in description.buildings if one.base < MIN_PASSAGE]
+        outlines += [one.outline for one in description.solids]
         rings = ring_roads(streets.road_map.roads, description.roundabouts)
         islands = enclosed([lane.polygon for lane in lanes if lane.road_id in rings])
         houses = united([islands, *(shifted(one, -origin) for one in outlines)])
@@ -913,7 +916,8 @@ def _with_item_source(part: Part, item: Building | Wall | Slab | Trees | Poles) 
 
 def _side_way_parts(description: SiteDescription, street: _Surroundings, laid: BaseGeometry) -> list[Part]:
     """Return ways next to the road by kind, without areas of lanes, buildings, other roads and laid surfaces."""
-    standing: list[Building | PlacedSolid] = [*description.buildings, *description.solids]
+    on_ground = [one for one in description.buildings if one.base < MIN_PASSAGE]
+    standing: list[Building | PlacedSolid] = [*on_ground, *description.solids]
     houses = shapely.union_all([one.outline for one in standing])
     covered = [street.covered, street.roadside.filled, laid, houses, street.crossing.area]
     taken = shapely.union_all(covered).buffer(road_surface.MAX_SEAM)

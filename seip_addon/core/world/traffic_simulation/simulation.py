@@ -20,6 +20,7 @@ from .demand import Demand, write_routes
 from .street_network import PARKED_CLASS, StreetNetwork, read_network
 
 STEP_SECONDS = 0.1  # seconds between two steps of the simulation
+MIN_LANE_WIDTH = 1.0  # metres
 SAMPLING_SECONDS = 0.2  # seconds between two samples of the trajectories
 _LANE_CHANGE_SECONDS = 4.0  # seconds; without it SUMO's vehicles jump from lane to lane
 _MAX_SIGNAL_DISTANCE = 60.0  # metres, largest distance of a crosswalk from its traffic light
@@ -187,7 +188,9 @@ def _import_opendrive(
     types = plain.with_name("lanes.typ.xml")
     allowed = _LANES | {"none": 'disallow="all"'}
     _write(types, "types", [f'<type id="{lane}" speed="13.89" {who}/>' for lane, who in allowed.items()])
-    lanes = ["--opendrive.import-all-lanes", "true", "--type-files", types, "--tls.guess", "true"]
+    # netconvert closes lanes below a least width, such as the two halves of one lane for both directions.
+    narrow = ["--opendrive.min-width", MIN_LANE_WIDTH, "--opendrive.import-all-lanes", "true"]
+    lanes = [*narrow, "--type-files", types, "--tls.guess", "true"]
     source = ["--opendrive-files", map_path, *lanes, "--output-file", plain]
     yield from run(programs, programs.netconvert, [*source, *common], "reading the map")
 

@@ -27,7 +27,9 @@ def area(model, *names):
 
 def crossroads(**tags):
     extract = Extract(52.5, 15.0)  # where the map's north is north
-    extract.way([(-250, 0), (0, 0), (30, 0), (250, 0)], **({"highway": "secondary", "name": "East Road", "lanes": 2} | tags))
+    extract.way(
+        [(-250, 0), (0, 0), (30, 0), (250, 0)], **({"highway": "secondary", "name": "East Road", "lanes": 2} | tags)
+    )
     extract.way([(0, -200), (0, 0)], highway="residential", name="South Road")
     return extract
 
