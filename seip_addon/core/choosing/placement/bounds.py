@@ -211,14 +211,14 @@ class Composition:
     quota: tuple[int, ...]
 
 
-def compositions(instance: Instance) -> list[Composition | None]:
-    """Return compositions, one of which each placement keeps to; a single None without a budget or if there are many.
+def compositions(instance: Instance) -> list[Composition]:
+    """Return compositions, one of which each placement keeps to; none without a budget or if there are many.
 
     Under a budget the bound of each composition by itself is smaller than that with a multiplier, which mixes them.
     """
     prices, kind = np.unique(instance.price, return_inverse=True)
     if math.isinf(instance.budget) or len(prices) > MAX_PRICES or prices[0] <= 0:
-        return [None]
+        return []
     budget = instance.budget * (1 + TIE_TOLERANCE)
     dear = np.array(list(itertools.product(range(instance.count + 1), repeat=len(prices) - 1)), dtype=np.int64)
     left = budget - dear @ prices[1:]
@@ -226,7 +226,7 @@ def compositions(instance: Instance) -> list[Composition | None]:
     full = [(int(number), *map(int, others)) for number, others in zip(cheap, dear, strict=True) if number >= 0]
     full = [one for one in full if np.dot(one, prices) <= budget]
     kept = [one for one in full if not any(_within(one, other) for other in full)]
-    return [Composition(kind, one) for one in kept] if len(kept) <= MAX_COMPOSITIONS else [None]
+    return [Composition(kind, one) for one in kept] if len(kept) <= MAX_COMPOSITIONS else []
 
 
 def _within(one: tuple[int, ...], other: tuple[int, ...]) -> bool:

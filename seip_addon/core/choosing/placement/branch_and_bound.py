@@ -146,31 +146,63 @@ class BranchAndBound:
         left: Integer = np.unique(np.concatenate([self.incumbent.chosen, *members]))
         return left
 
-    def start(self) -> Generator[Progress, None, None]:
-        """Bound all placements, and open the first nodes: one, or one for each composition that spends the budget."""
-        every = np.arange(len(self.instance))
-        parameters = self._block.start(self._block.together(self.incumbent.chosen))
-        self._spare = (1.0 - ROOT_SHARE) * self.incumbent.work.left
-        for composition in compositions(self.instance):
-            root = _Node(-math.inf, 0, np.zeros(0, dtype=np.int64), every, every, parameters, composition)
-            yield from self._start_from(root)
+    def start(self) -> Generator[Progress, None, Float]:
+        """Bound all placements, and open the first nodes: one, or one for each composition that spends the budget.
+
+        Returns
+        -------
+        (c,) float64
+            Rank of the candidates: the net scores of the bound on all placements, minus infinity for those that it
+            rules out.
+        """
+        every, work = np.arange(len(self.instance)), self.incumbent.work
+        begin = self._block.start(self._block.together(self.incumbent.chosen))
+        kinds = compositions(self.instance)
+        last = (1.0 - ROOT_SHARE) * work.left
+        rank = np.full(len(every), -math.inf)
+        root = _Node(-math.inf, 0, every[:0], every, every, begin)
+        self._spare = last + (0.5 * (work.left - last) if kinds else 0.0)
+        found = yield from self._root(root, begin)
+        if found is not None:
+            root, rank[found[0].left] = found
+        if found is not None and not kinds:
+            self._push(root, -root.rank)
+        for number, composition in enumerate(kinds if found is not None else []):
+            # each has its share of the work; without any left the parameters of the bound on all give a bound on each
+            self._spare = work.left - max(0.0, work.left - last) / (len(kinds) - number)
+            found = yield from self._root(replace(root, composition=composition), begin)
+            if found is not None:
+                self._push(found[0], -found[0].rank)
+        self._spare = 0.0
         self._note(self.bound)
         yield self.incumbent.progress("bounding")
+        return rank
 
-    def _start_from(self, root: _Node) -> Generator[Progress, None, None]:
+    def _root(self, root: _Node, begin: Float) -> Generator[Progress, None, tuple[_Node, Float] | None]:
+        """Return a root with its bound, and the net scores of the candidates that are left; None if it is cut.
+
+        Parameters
+        ----------
+        begin : (t,) float64
+            Parameters from which the bound is lowered; those of the root may give a lower one.
+        """
         problem, targets = self._problem(root, root.left)
-        bound = min(
-            first_bound(problem.block, problem.rest, problem.base, problem.raised),
-            bound_at(problem.block, problem.rest, problem.base, root.parameters[targets], problem.raised),
-            key=lambda one: one.value,
-        )
+        known = bound_at(problem.block, problem.rest, problem.base, root.parameters[targets], problem.raised)
+        bound = known
+        if root.composition is not None and self.incumbent.work.left > self._spare:
+            bound = bound_at(problem.block, problem.rest, problem.base, begin[targets], problem.raised)
+        if root.composition is None:
+            by_gains = first_bound(problem.block, problem.rest, problem.base, problem.raised)
+            bound = min(bound, by_gains, key=lambda one: one.value)
+        self.incumbent.work.spend(2.0 * problem.block.operations)
         for _ in range(0, ROOT_STEPS, ROUND):
             before = bound.value
-            bound = self._steps(problem, bound, ROUND)
+            if self.incumbent.work.left > self._spare:
+                bound = self._steps(problem, bound, ROUND)
             yield self.incumbent.progress("bounding")
             within = np.flatnonzero(bound.forced() >= self.incumbent.least_better)
             if not len(within):
-                return
+                return None
             if len(within) < len(problem.left):
                 problem = self._restricted(problem, within)
                 lower = bound_at(problem.block, problem.rest, problem.base, bound.parameters, problem.raised)
@@ -178,10 +210,12 @@ class BranchAndBound:
             if before - bound.value < LEAST_FALL * bound.value or self.incumbent.work.left <= self._spare:
                 break
         self.incumbent.offer(problem.left[bound.selection.picked])
-        limit = min(bound.value, self._total + self._rounding)
         parameters = root.parameters.copy()
-        parameters[targets] = bound.parameters
-        self._push(replace(root, left=problem.left, first=problem.left, parameters=parameters), limit)
+        if bound.value < known.value or root.composition is None:
+            parameters[targets] = bound.parameters
+        limit = min(bound.value, known.value, self._total + self._rounding)
+        node = replace(root, rank=-limit, left=problem.left, first=problem.left, parameters=parameters)
+        return node, bound.selection.net
 
     def run(self) -> Generator[Progress, None, bool]:
         """Search until nothing can be better, or the work is done; return whether the best placement is proven."""
@@ -345,7 +379,7 @@ class BranchAndBound:
         for _, lower in zip(range(most), steps, strict=False):
             bound = lower
             self.incumbent.work.spend(problem.block.operations)
-            if bound.value < goal or self.incumbent.work.left <= 0:
+            if bound.value < goal or self.incumbent.work.left <= self._spare:
                 break
         return bound
 

@@ -15,7 +15,15 @@ from ...arrays import Float, Integer
 from ...progress import Progress
 from .incumbent import Incumbent
 from .problem import TIE_TOLERANCE
+from .search_limits import OVERHEAD_OPERATIONS
 
+CORE_STEPS, LEAST_CORE = (0.5, 0.5, 0.5, 8.0), 130
+"""Cores of candidates among which restarts search in turn: the most promising ones, as many as make a step take these
+multiples of what goes on around it, and the least number of them.
+
+The best placements nearly always consist of candidates of large net scores in the linear bound: a small problem (kernel
+search: Angelelli, Mansini and Speranza 2010).
+"""
 PATIENCE = 120
 """Restarts without a better placement after which the search ends, in addition to as many as led to the best one."""
 WALK_LOSS, MIXTURE_LOSS = 0.01, 0.02
@@ -39,10 +47,14 @@ class Search:
     start : (s,) int64
         Candidates that serve the mandatory groups.
     seed : int
+    among : (n,) int64, optional
+        Candidates to search among, ascending; by default all. Those of placements are then indices among these.
     """
 
-    def __init__(self, incumbent: Incumbent, start: Integer, seed: int = 0) -> None:
-        self.incumbent, self.instance, self.start = incumbent, incumbent.instance, start
+    def __init__(self, incumbent: Incumbent, start: Integer, seed: int = 0, among: Integer | None = None) -> None:
+        self.incumbent, self.start = incumbent, start
+        self.among = np.arange(len(incumbent.instance)) if among is None else among
+        self.instance = incumbent.instance if among is None else incumbent.instance.of(among)
         self._random = np.random.default_rng(seed)
         instance = self.instance
         mixed = math.isfinite(instance.budget) and np.ptp(instance.price) > 0
@@ -65,30 +77,56 @@ class Search:
             chosen = self._without_weakest(chosen)
         yield from self._improved((yield from self.filled(chosen, 0.0)))
 
-    def restarts(self, effort: float) -> Steps:
+    def restarts(self, effort: float, rank: Float) -> Steps:
         """Restart from a part of a good placement until that stops improving the best one, or for units of work.
 
         The placement to leave is the last end of swaps, in turn with the best one of some mixture of prices, if these
         are little worse than the best one of all: so the search moves away from it.
+
+        Parameters
+        ----------
+        rank : (c,) float64
+            Rank of the candidates, largest first, by which restarts limit them.
         """
         incumbent, work, instance = self.incumbent, self.incumbent.work, self.instance
         last = work.left - effort
         number = best_at = 0
         current = incumbent.chosen
         mixtures = {self._mixture(current): (incumbent.value, current)}
+        cores = self._cores(rank)
         while number - best_at < PATIENCE + best_at and work.left > max(last, 0.0):
+            core = cores[number % len(cores)]
             number += 1
             before = incumbent.value
-            found = yield from self._improved((yield from self._restarted(current)))
+            found = yield from core.restarted(current)
             value = instance.value(found)
-            if incumbent.value > before + instance.slack:
-                best_at = number
+            if value > before + instance.slack:
+                found = yield from self._improved(found)
+                value, best_at = incumbent.value, number
+                if not all(np.isin(incumbent.chosen, one.among).all() for one in cores):
+                    cores = self._cores(rank)
             if value > mixtures.get(self._mixture(found), (-math.inf, found))[0]:
                 mixtures[self._mixture(found)] = value, found
             current = found if self._is_good(value, WALK_LOSS) and number % RETURN != 0 else incumbent.chosen
             if number % 2 and len(self.powers) > 1:
                 good = [one for reached, one in mixtures.values() if self._is_good(reached, MIXTURE_LOSS)]
                 current = good[self._random.integers(len(good))]
+
+    def _cores(self, rank: Float) -> list[Search]:
+        """Return searches among the candidates of highest rank, and those of the best placement."""
+        instance, order = self.instance, np.argsort(-rank, kind="stable")
+        needed = np.union1d(self.incumbent.chosen, np.flatnonzero(instance.mandatory.any(axis=0)))
+        cores: dict[float, Search] = {}
+        for steps in dict.fromkeys(CORE_STEPS):
+            number = int(steps * OVERHEAD_OPERATIONS / instance.update_operations * len(order))
+            among = np.union1d(needed, order[: max(LEAST_CORE, number)])
+            cores[steps] = Search(self.incumbent, among[:0], int(self._random.integers(2**32)), among)
+        return [cores[steps] for steps in CORE_STEPS]
+
+    def restarted(self, current: Integer) -> Generator[Progress, None, Integer]:
+        """Return an end of swaps from a part of a placement, both of candidates of the incumbent's instance."""
+        found = yield from self._swapped((yield from self._restarted(np.flatnonzero(np.isin(self.among, current)))))
+        return self.among[found]
 
     def _is_good(self, value: float, loss: float) -> bool:
         """Return whether a value is worse than the best one by no more than a share."""

@@ -113,13 +113,13 @@ def search_and_prove(
     if known is not None:
         yield from search.adapt(np.flatnonzero(np.isin(instance.original, known)))
     branches, name = BranchAndBound(incumbent, instance.relaxed(_shares(incumbent))), "branch and bound"
-    yield from branches.start()
+    promise = yield from branches.start()
     if incumbent.proven:
         return name
     few = instance.count <= GREEDY_SENSORS
     if few and (yield from branches.run_greedily(QUICK_SHARE)):
         return name
-    yield from search.restarts((RESTART_SHARE if instance.is_plain else SCENARIO_SHARE) * work.left)
+    yield from search.restarts((RESTART_SHARE if instance.is_plain else SCENARIO_SHARE) * work.left, promise)
     if few and (yield from branches.run_greedily(GREEDY_SHARE)):
         return name
     rest, part = branches.left(), work.part(PROGRAM_SHARE * work.left)
