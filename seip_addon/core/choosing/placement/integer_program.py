@@ -49,7 +49,8 @@ TOTAL_VALUE = 1e4  # largest value in a program: far above the solvers' absolute
 TOLERANCE = 2e-6  # share of the largest value that a solver's tolerances of 1e-6 may add up to, doubled
 MAX_ENTRIES = 1_000_000  # entries of A up to which a program is built: PuLP takes 0.5 kB for each
 MAX_REJECTED = 100  # placements in a row that a solver cannot tell from a better one, before giving up
-OPERATIONS_PER_ENTRY = 3e3  # multiplications per entry of a program that count as the work of one branch of a solver
+OPERATIONS_PER_ENTRY = 2.5e4  # multiplications per entry of a program that count as the work of one branch of a solver
+LATEST = 1.5  # seconds per unit of work after which a solver ends that a user has named
 CALL_OPERATIONS = 3e7  # multiplications that take as long as handing the smallest program to a solver
 ROOT_OPERATIONS = 1.5  # multiplications per squared entry that count as the work of the first linear relaxation
 
@@ -99,14 +100,14 @@ class Outcome:
         Upper bound on the objective of any placement; infinite if the solver reports none.
     finished : bool
         Whether the solver ran to its end: ``chosen`` is optimal, or nothing is feasible.
-    nodes : int
-        Branches that the solver took.
+    nodes : int, optional
+        Branches that the solver took; None if it does not report them.
     """
 
     chosen: Integer | None
     bound: float
     finished: bool
-    nodes: int = 0
+    nodes: int | None = 0
 
 
 class PlacementProgram:
@@ -147,14 +148,18 @@ class PlacementProgram:
     ) -> Generator[Progress, None, Outcome]:
         """Solve for the largest objective within a limit of work, in a thread of its own.
 
-        Closing the generator, and a user's request to end the search, ask the solver to stop.
+        Closing the generator, and a user's request to end the search, ask the solver to stop. The limit is a number of
+        branches, whose time differs: a solver that the user has named also ends after a time, which depends on the
+        machine.
         """
         self.model.setObjective(objective)
         size = entries + len(self.x)
         each = size * OPERATIONS_PER_ENTRY
         nodes = math.ceil(work.left * OPERATIONS_PER_UNIT / each) if math.isfinite(work.left) else None
+        seconds = LATEST * work.left if nodes is not None and solver != "auto" else None
         solving = in_thread(
-            lambda stop: self._solve(solver, nodes, stop), f"solving an integer program of {len(self.x)} candidates"
+            lambda stop: self._solve(solver, nodes, seconds, stop),
+            f"solving an integer program of {len(self.x)} candidates",
         )
         outcome = Outcome(None, math.inf, finished=False)
         while work.left > 0:
@@ -164,11 +169,13 @@ class PlacementProgram:
                 outcome = stop.value
                 break
         solving.close()
-        work.spend(CALL_OPERATIONS + _root_operations(entries) + outcome.nodes * each)
+        work.spend(CALL_OPERATIONS + _root_operations(entries) + (outcome.nodes or 0) * each)
+        if nodes is not None and not outcome.finished and outcome.nodes is None:
+            work.spend(work.left * OPERATIONS_PER_UNIT)
         return outcome
 
-    def _solve(self, solver: str, nodes: int | None, stop: threading.Event) -> Outcome:
-        with _engine(solver, nodes, stop) as engine:
+    def _solve(self, solver: str, nodes: int | None, seconds: float | None, stop: threading.Event) -> Outcome:
+        with _engine(solver, nodes, seconds, stop) as engine:
             try:
                 self.model.solve(engine)
             except (pulp.PulpSolverError, OSError) as error:
@@ -319,8 +326,8 @@ class _Highs(pulp.HiGHS):  # type: ignore[misc]
 
 
 @contextmanager
-def _engine(solver: str, nodes: int | None, stop: threading.Event) -> Iterator[Any]:
-    """Yield PuLP's interface to a solver that proves optimality within a number of branches, if given.
+def _engine(solver: str, nodes: int | None, seconds: float | None, stop: threading.Event) -> Iterator[Any]:
+    """Yield PuLP's interface to a solver that proves optimality within a number of branches and a time, if given.
 
     HiGHS ends soon after ``stop`` is set; PuLP offers no way to stop the others.
     """
@@ -336,15 +343,16 @@ def _engine(solver: str, nodes: int | None, stop: threading.Event) -> Iterator[A
             msg=False,
             gapRel=0.0,
             threads=1,
+            timeLimit=seconds,
             callbackTuple=(interrupt, None),
             callbacksToActivate=[kinds.kCallbackMipInterrupt, kinds.kCallbackSimplexInterrupt],
             **({} if nodes is None else {"mip_max_nodes": nodes}),
         )
     elif solver == "cbc":
         with _executable_cbc() as path:
-            yield pulp.COIN_CMD(path=path, msg=False, gapRel=0.0, threads=1, maxNodes=nodes)
+            yield pulp.COIN_CMD(path=path, msg=False, gapRel=0.0, threads=1, maxNodes=nodes, timeLimit=seconds)
     else:
-        yield pulp.GUROBI(msg=False, gapRel=0.0, Threads=1, **({} if nodes is None else {"NodeLimit": nodes}))
+        yield pulp.GUROBI(msg=False, gapRel=0.0, Threads=1, timeLimit=seconds, **({} if nodes is None else {"NodeLimit": nodes}))
 
 
 def _bound(model: pulp.LpProblem, solver: str) -> float:
@@ -359,9 +367,9 @@ def _bound(model: pulp.LpProblem, solver: str) -> float:
     return math.inf
 
 
-def _nodes(model: pulp.LpProblem, solver: str) -> int:
-    """Return the number of branches that a solver took; 0 if it does not report it."""
-    return max(int(model.solverModel.getInfo().mip_node_count), 0) if solver_name(solver) == "highs" else 0
+def _nodes(model: pulp.LpProblem, solver: str) -> int | None:
+    """Return the number of branches that a solver took; None if it does not report it."""
+    return max(int(model.solverModel.getInfo().mip_node_count), 0) if solver_name(solver) == "highs" else None
 
 
 @contextmanager
