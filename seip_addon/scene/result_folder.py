@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Generator, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -106,12 +106,14 @@ def write_result_folder(
         tidy_pieces(scene)
         write_result(scene, site, deployment)
         save_blend(part["placed.blend"])
-        save_glb(part["scene.glb"], site.attribution)
-        yield from write_tables(part, survey, solution, record)
         with TemporaryDirectory(prefix="seip-") as raw:
-            rendered = None
-            if render:
-                rendered = yield from render_elsewhere(Path(raw), part["placed.blend"], scene.name, site, deployment)
+            pictures = render_elsewhere(Path(raw), part["placed.blend"], scene.name, site, deployment)
+            with closing(pictures):
+                if render:
+                    next(pictures)  # starts the other Blender, which renders while this one writes
+                save_glb(part["scene.glb"], site.attribution)
+                yield from write_tables(part, survey, solution, record)
+                rendered = (yield from pictures) if render else None
             write_pictures(part, survey, record, deployment, rendered, shown_legend(scene))
 
 
