@@ -352,7 +352,8 @@ def _engine(solver: str, nodes: int | None, seconds: float | None, stop: threadi
         with _executable_cbc() as path:
             yield pulp.COIN_CMD(path=path, msg=False, gapRel=0.0, threads=1, maxNodes=nodes, timeLimit=seconds)
     else:
-        yield pulp.GUROBI(msg=False, gapRel=0.0, Threads=1, timeLimit=seconds, **({} if nodes is None else {"NodeLimit": nodes}))
+        limit = {} if nodes is None else {"NodeLimit": nodes}
+        yield pulp.GUROBI(msg=False, gapRel=0.0, Threads=1, timeLimit=seconds, **limit)
 
 
 def _bound(model: pulp.LpProblem, solver: str) -> float:

@@ -1,4 +1,4 @@
-"""Anytime search: greedy choices, swaps, other mixtures of prices, and restarts from a part of the best placement.
+"""Anytime search: greedy choices, swaps, and restarts from a part of good placements of several mixtures of prices.
 
 The greedy algorithm has at least 1 - 1/e (63 %) of the best value if only the number of sensors is limited (Nemhauser,
 Wolsey and Fisher 1978). Swaps end where no sensor has a better replacement; restarts lead to other such ends.
@@ -33,7 +33,6 @@ FIRST_CHOICES = 20  # candidates of largest gain, one of which begins a restart
 PRICE_POWERS = (0.0, 0.5, 1.0, 1.5)
 """Powers of the price by which gains are divided: different ones lead to different mixtures of prices."""
 RESTART_POWERS = (0.0, 1.0)  # those of restarts
-MAX_PRICES = 8  # different prices that are tried in place of each sensor
 
 Steps = Generator[Progress, None, None]
 
@@ -102,7 +101,8 @@ class Search:
             value = instance.value(found)
             if value > before + instance.slack:
                 found = yield from self._improved(found)
-                value, best_at = incumbent.value, number
+                value = instance.value(found)
+                best_at = number if incumbent.value > before + instance.slack else best_at
                 if not all(np.isin(incumbent.chosen, one.among).all() for one in cores):
                     cores = self._cores(rank)
             if value > mixtures.get(self._mixture(found), (-math.inf, found))[0]:
@@ -174,13 +174,9 @@ class Search:
         return rated
 
     def _improved(self, chosen: Integer) -> Generator[Progress, None, Integer]:
-        """Swap sensors until no swap helps; then, of a new best placement, try other mixtures of prices."""
+        """Swap sensors until no swap helps, and offer the result."""
         chosen = yield from self._swapped(chosen)
-        while self.incumbent.offer(chosen) and len(self.powers) > 1:
-            mixed = yield from self._mixed(chosen)
-            if mixed is None:
-                break
-            chosen = yield from self._swapped(mixed)
+        self.incumbent.offer(chosen)
         return chosen
 
     def _swapped(self, chosen: Integer) -> Generator[Progress, None, Integer]:
@@ -200,34 +196,6 @@ class Search:
                 value, still = (reached if len(chosen) == len(swapped) else instance.value(chosen)), 0
             yield self.incumbent.progress("improving the placement")
         return chosen
-
-    def _mixed(self, chosen: Integer) -> Generator[Progress, None, Integer | None]:
-        """Return a better placement with another mixture of prices, if one is found.
-
-        For each sensor and each price the sensor goes, and further ones of least loss, until the best candidate of that
-        price is affordable; the budget that is left is then spent greedily: several cheap sensors for a dear one, or
-        the reverse.
-        """
-        instance = self.instance
-        value = instance.value(chosen)
-        prices = np.unique(instance.price)
-        prices = prices[np.linspace(0, len(prices) - 1, min(len(prices), MAX_PRICES)).astype(np.int64)]
-        for gone in chosen.tolist():
-            for price in prices[prices != instance.price[gone]].tolist():
-                rest = chosen[chosen != gone]
-                while len(rest) and not instance.affordable(math.fsum(instance.price[rest]) + price):
-                    rest = self._without_weakest(rest)
-                gain = np.where(instance.addable(rest) & (instance.price == price), self._rated(rest, 0.0), -np.inf)
-                if not np.isfinite(gain.max()):
-                    continue
-                mixed = np.append(rest, int(np.argmax(gain)))
-                for power in (0.0, 1.0):
-                    other = yield from self.filled(mixed, power)
-                    if instance.value(other) > value + instance.slack and instance.feasible(other):
-                        return other
-                if self.incumbent.work.left <= 0:
-                    return None
-        return None
 
     def _is_within_limits(self, chosen: Integer) -> bool:
         price = math.fsum(self.instance.price[chosen])
