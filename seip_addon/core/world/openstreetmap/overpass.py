@@ -35,7 +35,8 @@ _STEP = 50  # metres: areas are downloaded in sizes that are multiples of this
 _ROUNDING = 1.0  # metres by which the middle of a downloaded area is rounded, at most
 _QUERY_SECONDS = 90  # time that the server may work on a query
 _QUERY_MEMORY = 1 << 28  # bytes that the server may use for it
-_CHUNK = 1 << 16
+_CHUNK = 1 << 16  # bytes that are received at once
+_BLOCK = 1 << 20  # bytes that are packed at once
 _SHOWN = 120  # characters of a server's message in ours
 _AGENT = "SEIP-for-Blender (roadside LiDAR placement)"  # the rules of public servers ask programs for their name
 _PACKED = 31  # of zlib: a gzip header and trailer
@@ -238,8 +239,10 @@ def download_extract(
             "before the longitude"
         )
     path = server.folder / area.file_name
-    with whole_file(path) as temporary:
-        temporary.write_bytes(gzip.compress(content))
+    with whole_file(path) as temporary, gzip.open(temporary, "wb", compresslevel=6) as file:
+        for start in range(0, len(content), _BLOCK):
+            yield Progress(start, len(content), "saving the extract")
+            file.write(content[start : start + _BLOCK])
     return path
 
 
@@ -278,7 +281,7 @@ def _free_slot(server: OverpassServer) -> Generator[Progress, None, float]:
         page = yield from _received(address, server)
     except (SeipError, _BusyError):  # not every server has such a page
         return server.pause
-    seconds = [float(one) for one in _SLOT.findall(page)]
+    seconds = [] if b"available now" in page else [float(one) for one in _SLOT.findall(page)]
     return max(1.0, min(seconds)) if seconds else server.pause
 
 
@@ -309,12 +312,12 @@ class _Transfer:
         try:
             # An opener of our own: the shared one keeps the proxies that the environment named at its first use.
             with build_opener().open(request, timeout=self._server.timeout) as response:
-                self._total = int(response.headers.get("Content-Length") or 0)
+                self._total = response.length or 0
                 return self._content(response, stop)
         except HTTPError as error:
             with error:
                 raise _refusal(error, self._server) from error
-        except (OSError, HTTPException, zlib.error, EOFError) as error:
+        except (OSError, HTTPException, zlib.error, EOFError, ValueError) as error:  # ValueError: no name of a host
             raise _fault(error, self._server) from error
 
     def _content(self, response: HTTPResponse, stop: threading.Event) -> bytes:
@@ -352,7 +355,7 @@ def _check(content: bytes, server: OverpassServer) -> None:
             f"the answer of {server.name} is not map data ({_plain(content[:_SHOWN])!r}): check the address of the "
             "Overpass server"
         )
-    if not content.rstrip().endswith(b"</osm>"):
+    if not content[-_SHOWN:].rstrip().endswith(b"</osm>"):
         raise SeipError(_CUT_OFF.format(host=server.name))
 
 

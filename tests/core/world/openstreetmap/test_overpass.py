@@ -160,7 +160,7 @@ def after(seconds):
     ({"Retry-After": after(90)}, "", 90),
     ({"Retry-After": "soon"}, "", 15),
     ({}, STATUS, 12),
-    ({}, "Rate limit: 2\n2 slots available now.\n", 15),
+    ({}, STATUS.replace("Rate limit: 2\n", "Rate limit: 3\n1 slots available now.\n"), 15),
 ])  # fmt: skip
 def test_waiting_takes_the_time_that_the_server_names_and_ends_at_once(stand_in, tmp_path, headers, status, seconds):
     stand_in.answers, stand_in.status = [Answer(RATE_LIMIT, 429, headers)], status
@@ -284,6 +284,11 @@ def test_proxy_that_asks_for_a_password_is_named(stand_in, server, monkeypatch):
 def test_address_that_is_none_is_named(server, address):
     with pytest.raises(SeipError, match="is not the address of an Overpass server: give one like https://"):
         download(OverpassServer(server.folder, address))
+
+
+def test_name_that_no_host_has_is_named(server):
+    with pytest.raises(SeipError, match=r"cannot be reached \(.*too long.*check the connection"):
+        download(OverpassServer(server.folder, f"http://{'a' * 70}.invalid/"))
 
 
 def test_address_of_a_server_gets_the_usual_path(stand_in, tmp_path):
