@@ -1,11 +1,15 @@
 """A place that is pasted into the panel: its surroundings are downloaded where Blender may go online."""
 
+import threading
+from concurrent.futures import CancelledError
 from types import SimpleNamespace
 
 import bpy
 import pytest
 
 from seip_addon import preferences, scene_status
+from seip_addon.background import Background
+from seip_addon.core.workflows.site_building import SiteRequest, site_source
 from seip_addon.panels import site as site_panel
 from seip_addon.scene import contract
 from tests.builders.drawn_layout import DrawnLayout
@@ -81,6 +85,16 @@ def test_the_site_is_built_with_its_credit_and_a_larger_one_downloads_more(scene
         path.unlink()
     assert bpy.ops.seip.build_site() == {"FINISHED"}
     assert len(stand_in.queries) == 3
+
+
+def test_a_stopped_download_ends_at_once_and_leaves_no_file(stand_in, tmp_path):
+    stand_in.answers = [Answer(overpass_xml(crossing()), sent=400, held=threading.Event())]
+    work = Background(site_source(SiteRequest(near_latlon=(52.5, 13.4), overpass=preferences.overpass())))
+    work.stop()
+    assert work.join(2.0)
+    with pytest.raises(CancelledError):
+        work.result()
+    assert not (tmp_path / "openstreetmap").exists()
 
 
 def test_nothing_is_downloaded_where_blender_may_not_go_online(scene, stand_in, online):
