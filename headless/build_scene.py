@@ -28,6 +28,7 @@ from seip_addon.core.output.pictures.palette import INK, SOFT_INK
 from seip_addon.core.progress import finish
 from seip_addon.core.site.sources import source_lines
 from seip_addon.core.storage.files import locked_file
+from seip_addon.core.sumo_programs import NETWORK_SUFFIX
 from seip_addon.core.workflows.site_building import SiteRequest, build_site, save_map
 from seip_addon.core.world.elevation.at_place import TerrainRequest
 from seip_addon.core.world.elevation.obstacles import MAX_CHANGED, RAYS, Merging, chosen_merging
@@ -69,7 +70,7 @@ def main(argv: list[str]) -> None:
 
 
 def _build(request: argparse.Namespace) -> None:
-    map_path = request.output.with_suffix(".xodr")
+    map_path = request.output.with_suffix(NETWORK_SUFFIX)
     for path in (request.output, map_path):
         if path.is_dir():
             raise SeipError(f"{path} is a folder, and a file of that name would be written; choose another name")
@@ -95,7 +96,7 @@ def _build(request: argparse.Namespace) -> None:
         f"region of interest {model.region.area:.0f} m², local origin at map ({x:.0f}, {y:.0f}, {z:.0f})"
     )
     if built.map_text is not None:
-        runtime.print_line(f"{map_path}: the map of its streets, to simulate traffic on")
+        runtime.print_line(f"{map_path}: the network of its streets, to simulate traffic on")
 
 
 def _asked_site(options: argparse.Namespace) -> SiteRequest:

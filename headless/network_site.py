@@ -60,7 +60,7 @@ def _survey(folder: Path, job: SurveyJob) -> Generator[Progress, None, None]:
         built = yield from build_site(source, request)
         scene = new_file()
         yield from build_scene(scene, divided(built.model, job.place), built.map_name)
-        save_map(built, folder / "site.xodr")
+        save_map(built, folder / "site.net.xml")
     save_blend(folder / SCENE)
     survey = yield from _surveyed(folder, job.settings)
     problem = yield from site_problem(survey, job.objective, job.place)

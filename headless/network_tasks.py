@@ -23,7 +23,7 @@ from seip_addon.core.workflows.survey_settings import SurveySettings
 
 FORMAT = "seip-network-site/1"
 REQUEST = "request.pickle"
-SURVEY_FILES = ("site.blend", "visibility.npz", "visibility.returns.npz", "problem.npz", "site.xodr")
+SURVEY_FILES = ("site.blend", "visibility.npz", "visibility.returns.npz", "problem.npz", "site.net.xml")
 """Files of the survey of a site; the last two need not exist in all of them."""
 PLACED_FILES = "placed"
 """Folder of the files of a placement, below that of the request."""

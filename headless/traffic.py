@@ -6,7 +6,7 @@ In Blender, on the scene that is open::
 
 or as plain Python on the bpy module::
 
-    seip traffic site.blend --simulate site.xodr --flow 600 --seed 1 --duration 120 -o traffic.npz
+    seip traffic site.blend --simulate site.net.xml --flow 600 --seed 1 --duration 120 -o traffic.npz
 """
 
 import argparse
@@ -114,7 +114,7 @@ def _parser() -> argparse.ArgumentParser:
     source = parser.add_mutually_exclusive_group(required=True)
     source.add_argument("--fcd", type=Path, metavar="FILE", help="SUMO's floating car data: .xml or .csv, also as .gz")
     source.add_argument(
-        "--simulate", type=Path, metavar="XODR", help="map of the scene, on which SUMO simulates traffic"
+        "--simulate", type=Path, metavar="MAP", help="map or network of the scene, on which SUMO simulates traffic"
     )
     reading = parser.add_argument_group("with --fcd")
     reading.add_argument(

@@ -172,7 +172,7 @@ def _read_map(path: Path, _: bytes) -> None:
     from seip_addon.core.progress import finish  # noqa: PLC0415
     from seip_addon.core.world.opendrive.read import read_map  # noqa: PLC0415
     from seip_addon.core.world.streetscape.description import describe_place  # noqa: PLC0415
-    from seip_addon.core.world.streetscape.model import site_model  # noqa: PLC0415
+    from tests.builders.map_models import site_model  # noqa: PLC0415
 
     _, description = describe_place(path, near=(0.0, 0.0), radius=30.0)
     model = finish(site_model(read_map(path), description))

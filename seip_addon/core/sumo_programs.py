@@ -18,6 +18,8 @@ MISSING = (
 )
 SYSTEM_HOMES = (Path("/usr/share/sumo"), Path("/usr/local/share/sumo"), Path("/opt/homebrew/share/sumo"))
 """System folders for the data of SUMO."""
+NETWORK_SUFFIX = ".net.xml"
+"""End of the name of a network of SUMO, as the streets of an extract have it."""
 START_SECONDS = 30.0
 """Longest time in which SUMO states its version, also while Windows checks a new program."""
 _VERSION = re.compile(r"netconvert\s+(?:Version\s+)?v?(\d\S*)")

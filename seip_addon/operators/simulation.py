@@ -21,7 +21,7 @@ from .base import Conditional, LongWork
 from .traffic import show_traffic
 
 NO_MAP = "There is no map to simulate traffic on: name the OpenDRIVE map (.xodr) that this site was built from."
-_TEXT_MAP = "streets.xodr"
+_TEXT_MAP = "streets.net.xml"
 """Name for the map of a text whose own name is no name of a file."""
 
 

@@ -16,6 +16,7 @@ from ..core.site.check import SceneContents, SiteCheck, check_site
 from ..core.site.roles import Role
 from ..core.site.scene_geometry import SceneGeometry
 from ..core.site.site import Site
+from ..core.sumo_programs import NETWORK_SUFFIX
 from ..core.workflows.site_building import BuiltSite, SiteRequest, build_site, site_source
 from ..core.workflows.site_places import SitePlaces, site_places
 from ..core.workflows.survey import lay_out
@@ -242,7 +243,7 @@ def _keep_map(scene: bpy.types.Scene, built: BuiltSite) -> None:
         source = scene.seip.site.source  # as it was named: relative to the file, or not
         simulation.map = source if absolute(source) == built.map_path else str(built.map_path)
     else:
-        name = f"{scene.name}.xodr"
+        name = f"{scene.name}{NETWORK_SUFFIX}"
         if name in bpy.data.texts:  # of the site that this one replaces
             bpy.data.texts.remove(bpy.data.texts[name])
         text = bpy.data.texts.new(name)

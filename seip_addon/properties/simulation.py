@@ -7,6 +7,7 @@ from pathlib import Path
 import bpy
 from bpy.props import IntProperty, StringProperty
 
+from ..core.sumo_programs import NETWORK_SUFFIX
 from ..core.workflows.traffic_simulation import DEFAULT_RUNS, SimulationSettings
 from ..core.world.openstreetmap.site import is_extract
 from ..core.world.traffic_simulation.demand import Demand
@@ -23,8 +24,9 @@ class SEIP_PG_simulation(bpy.types.PropertyGroup):
 
     map: StringProperty(
         name="Map",
-        description="OpenDRIVE map of the site (.xodr), on which SUMO simulates traffic: a file, or a text in this "
-        f"file such as the streets of an extract; {EXAMPLE} for that of the example. Empty for the map beside the file",
+        description="Map of the site, on which SUMO simulates traffic: OpenDRIVE (.xodr) or a network of SUMO "
+        "(.net.xml), as a file, or a text in this file such as the streets of an extract; "
+        f"{EXAMPLE} for that of the example. Empty for the map beside the file",
         subtype="FILE_PATH",
         options={"PATH_SUPPORTS_BLEND_RELATIVE"},
     )
@@ -62,7 +64,7 @@ class SEIP_PG_simulation(bpy.types.PropertyGroup):
         if not name or not bpy.data.filepath:
             return None
         # `seip build-scene` writes the map of an extract's streets beside the scene, under the name of the scene
-        path = file.with_suffix(".xodr") if is_extract(Path(name)) else file.with_name(name)
+        path = file.with_suffix(NETWORK_SUFFIX) if is_extract(Path(name)) else file.with_name(name)
         return path if path.is_file() else None
 
     def settings(self) -> SimulationSettings:

@@ -74,8 +74,8 @@ def test_a_site_of_an_extract_is_built_with_its_map(scene, extract):
     assert read_scene(scene).geometry.region.area > 400
     assert len(contract.find(scene, contract.OCCLUDERS).objects) >= 4
     (text,) = bpy.data.texts
-    assert text.name.endswith(".xodr")
-    assert "<OpenDRIVE" in text.as_string()
+    assert text.name.endswith(".net.xml")
+    assert "<net " in text.as_string()
 
 
 def test_the_example_is_the_shipped_junction_without_the_start_up_cube_and_the_view_shows_it_all(fresh):

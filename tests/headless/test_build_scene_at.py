@@ -37,11 +37,11 @@ def test_a_place_is_downloaded_built_and_credited(stand_in, tmp_path):
     assert scene[contract.MAP] == extract.name
     credit = f"© OpenStreetMap contributors (ODbL), data of {DATE}"
     assert read_scene(scene).geometry.attribution == (credit,)
-    assert credit in (tmp_path / "site.xodr").read_text(encoding="utf-8")
-    before = (tmp_path / "site.xodr").read_bytes()
+    assert credit in (tmp_path / "site.net.xml").read_text(encoding="utf-8")
+    before = (tmp_path / "site.net.xml").read_bytes()
     build(stand_in, tmp_path, "--at", "52.5,13.4", "--approaches", "40")
     assert len(stand_in.queries) == 1
-    assert (tmp_path / "site.xodr").read_bytes() == before
+    assert (tmp_path / "site.net.xml").read_bytes() == before
 
 
 @pytest.mark.parametrize(

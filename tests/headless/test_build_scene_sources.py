@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.world.opendrive.read import read_map
+from seip_addon.core.world.openstreetmap.network_map import read_network_map
 from seip_addon.scene import contract
 from seip_addon.scene.read import read_scene
 from tests.builders.dem_files import origin_at, sampled, write_dem
@@ -82,9 +82,12 @@ def test_the_map_is_written_where_the_level_must_be_chosen(tmp_path):
     extract.way([(0, -300), (0, 300)], highway="trunk", name="Trunk Road")
     path, output = extract.write(tmp_path / "place.osm"), tmp_path / "site.blend"
     asked = [str(path), "--near-latlon", "52.5, 13.4", "--radius", "60", "-o", str(output)]
-    with pytest.raises(SeipError, match=r"level 'High Road' or level 'Trunk Road'\); .*site\.xodr is written"):
+    with pytest.raises(SeipError, match=r"level 'High Road' or level 'Trunk Road'\); .*site\.net\.xml is written"):
         build_scene.main(asked)
     assert not output.exists()
-    assert {road.name for road in read_map(tmp_path / "site.xodr").roads} >= {"High Road", "Trunk Road"}
+    assert {road.name for road in read_network_map(tmp_path / "site.net.xml").streets.road_map.roads} >= {
+        "High Road",
+        "Trunk Road",
+    }
     build_scene.main([*asked, "--level", "High Road"])
     assert output.exists()

@@ -15,11 +15,11 @@ from seip_addon.core.site.candidates import CandidateSettings
 from seip_addon.core.site.site import make_site
 from seip_addon.core.world.opendrive.read import read_map
 from seip_addon.core.world.streetscape.description import SiteDescription
-from seip_addon.core.world.streetscape.model import site_model
 from seip_addon.scene import contract
 from seip_addon.scene.blend_file import new_file
 from seip_addon.scene.build import build_scene
 from seip_addon.scene.read import read_scene
+from tests.builders.map_models import site_model
 
 SCENES = Path(__file__).resolve().parents[2] / "scenes"
 COARSE = CandidateSettings(sensors=("type1", "type3"), heights=(5.4,), spacing=24.0)

@@ -106,14 +106,14 @@ def build_benchmark_site(site: BenchmarkSite, folder: Path, extracts: Path) -> G
     request = SiteRequest(near_latlon=(site.latitude, site.longitude), approaches=APPROACHES)
     built = yield from build_site(_extract_of(site, extracts), request)
     yield from build_scene(new_file(), built.model, built.map_name)
-    save_map(built, folder / "site.xodr")
+    save_map(built, folder / "site.net.xml")
     save_blend(scene)
     open_blend(scene)
     geometry = read_scene(bpy.context.scene).geometry
     demand = Demand(pedestrians=site.pedestrians) if site.pedestrians else Demand()
     traffic.mkdir(exist_ok=True)
     settings_of_runs = SimulationSettings(demand, duration=DURATION)
-    yield from simulate_runs(folder / "site.xodr", settings_of_runs, RUNS, geometry, traffic)
+    yield from simulate_runs(folder / "site.net.xml", settings_of_runs, RUNS, geometry, traffic)
     return scene
 
 

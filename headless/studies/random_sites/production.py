@@ -106,7 +106,7 @@ def site_key(settings: SiteSettings, number: int) -> str:
 def make_site(folder: Path, settings: SiteSettings, number: int) -> Generator[Progress, None, MadeSite]:
     """Generate a site in a folder, unless a site with the same settings is already there.
 
-    Its files are ``site.osm``, ``site.tif``, ``site.xodr``, ``site.blend``, ``site_traffic/run-*.npz`` and, written
+    Its files are ``site.osm``, ``site.tif``, ``site.net.xml``, ``site.blend``, ``site_traffic/run-*.npz`` and, written
     last, ``site.json``.
 
     Raises
@@ -148,7 +148,7 @@ def _finished(path: Path, key: str, settings: SiteSettings) -> dict[str, Any] | 
     except (OSError, ValueError):
         return None
     runs = [run_path(path.parent, run) for run in range(1, settings.runs + 1)]
-    files = [path.parent / "site.blend", path.parent / "site.xodr", *runs]
+    files = [path.parent / "site.blend", path.parent / "site.net.xml", *runs]
     there = all(file.is_file() for file in files)
     return record if there and isinstance(record, dict) and record.get("key") == key else None
 
@@ -200,7 +200,7 @@ def _build(folder: Path, plan: StreetPlan, settings: SiteSettings) -> Generator[
     check = yield from check_site(contents, _laid_out)
     if check.problems or contents.geometry is None:
         raise _UnusableError("; ".join(problem.text for problem in check.problems) or contents.complaint)
-    save_map(built, folder / "site.xodr")
+    save_map(built, folder / "site.net.xml")
     save_blend(folder / "site.blend")
     return contents.geometry
 
@@ -219,7 +219,7 @@ def _run_of_traffic(
         demand = replace(demand, pedestrians=settings.pedestrians)
     seed = int(random.integers(2**31))
     scenario = Scenario(demand, signals, seed, settings.warm_up + settings.duration)
-    simulated = yield from simulate_run(folder / "site.xodr", scenario, settings.warm_up, geometry)
+    simulated = yield from simulate_run(folder / "site.net.xml", scenario, settings.warm_up, geometry)
     trajectories = shaped(simulated.trajectories, seed)
     path = run_path(folder, streams[-1])
     trajectories.save(path)

@@ -1,6 +1,7 @@
 """Triangles in plan: areas, outlines and heights; and robust operations on areas."""
 
 from collections.abc import Iterable
+from typing import Literal
 
 import numpy as np
 import shapely
@@ -50,11 +51,14 @@ def united(areas: Iterable[BaseGeometry]) -> BaseGeometry:
     return shapely.union_all([shapely.make_valid(area) for area in areas], grid_size=_OVERLAY_GRID)
 
 
-def closed(area: BaseGeometry, gap: float) -> BaseGeometry:
-    """Return an area in plan with cracks and gaps up to twice ``gap`` metres filled."""
-    # Morphological closing. Mitred joins bring straight edges and corners back to where they were.
-    wider = _without_twins(area).buffer(gap, join_style="mitre")
-    return _without_twins(wider).buffer(-gap, join_style="mitre")
+def closed(area: BaseGeometry, gap: float, join: Literal["mitre", "round"] = "mitre") -> BaseGeometry:
+    """Return an area in plan with cracks and gaps up to twice ``gap`` metres filled.
+
+    Mitred joins bring straight edges and corners back to where they were. Where the gap is wider than the bends of the
+    outline, they fill more than the gap; round joins do not.
+    """
+    wider = _without_twins(area).buffer(gap, join_style=join)  # morphological closing
+    return _without_twins(wider).buffer(-gap, join_style=join)
 
 
 def _without_twins(area: BaseGeometry) -> BaseGeometry:
@@ -64,7 +68,10 @@ def _without_twins(area: BaseGeometry) -> BaseGeometry:
     """
     corners = np.unique(shapely.get_coordinates(area), axis=0)
     apart = np.unique(np.round(corners / _TWIN_DISTANCE), axis=0)
-    return area if len(apart) == len(corners) else shapely.set_precision(area, _TWIN_DISTANCE)
+    if len(apart) == len(corners):
+        return area
+    # A union on a grid may touch itself in a corner, which is not valid and cannot be rounded again.
+    return shapely.set_precision(area if area.is_valid else area.buffer(0), _TWIN_DISTANCE)
 
 
 def covered_share(area: BaseGeometry, others: shapely.STRtree) -> float:

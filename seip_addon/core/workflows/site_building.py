@@ -12,6 +12,7 @@ from shapely.geometry.base import BaseGeometry
 from ..arrays import Float
 from ..errors import SeipError
 from ..geometry.geo_reference import GeoReference
+from ..geometry.plan import united
 from ..progress import Progress
 from ..settings import setting
 from ..storage.files import whole_file
@@ -19,8 +20,9 @@ from ..world.elevation.at_place import MapSurroundings, TerrainRequest, with_ter
 from ..world.elevation.obstacles import Merging
 from ..world.opendrive.junctions import STREETS
 from ..world.opendrive.lanes import lane_surfaces
-from ..world.opendrive.read import read_map, with_attribution
+from ..world.opendrive.read import read_map
 from ..world.opendrive.road_map import RoadMap
+from ..world.openstreetmap.network_map import credited
 from ..world.openstreetmap.overpass import OverpassServer, download_extract, is_outgrown
 from ..world.openstreetmap.site import (
     STANDS_AROUND,
@@ -34,10 +36,10 @@ from ..world.openstreetmap.site import (
 from ..world.streetscape import road_surface
 from ..world.streetscape.description import DEFAULT_RADIUS, SiteDescription, describe_place
 from ..world.streetscape.geographic_position import in_metres
-from ..world.streetscape.intersections import without_plain_joints
 from ..world.streetscape.levels import UnclearLevelError
-from ..world.streetscape.model import SiteModel, site_model
+from ..world.streetscape.model import SiteModel, street_model
 from ..world.streetscape.place import SCENE_MARGIN, Place
+from ..world.streetscape.street_map import StreetMap, opendrive_streets
 
 DOWNLOAD_MARGIN = 200.0  # metres beyond the streets that are laid out: `site_of_extract` reads no more
 
@@ -153,10 +155,12 @@ def build_site(
     map_path, road_map, description = _of_map(source, request)
     notes: tuple[str, ...] = ()
     if request.osm is not None:
-        middle, reach = _where(road_map, description)
+        lanes = [lane for road in road_map.roads for lane in lane_surfaces(road)]
+        middle, reach = _where(StreetMap(road_map, tuple(lanes)), description)
         description, notes = yield from surroundings_of_map(request.osm, road_map, description, middle, reach)
-    description, more, merging = yield from _with_terrain(road_map, description, request)
-    model = yield from site_model(road_map, description)
+    streets = yield from opendrive_streets(road_map)
+    description, more, merging = yield from _with_terrain(streets, description, request)
+    model = yield from street_model(streets, description)
     return BuiltSite(map_path.name, replace(model, notes=(*notes, *more, *model.notes)), None, merging, map_path)
 
 
@@ -208,7 +212,8 @@ def _of_extract(source: Path, request: SiteRequest, map_path: Path | None) -> Ge
     if len(request.junction) == 1:
         raise SeipError(f'a junction of {source.name} needs two streets: give --junction "One Street" "Other Street"')
     with tempfile.TemporaryDirectory() as folder:
-        site = yield from site_of_extract(source, request.extract_place, Path(folder) / "streets.xodr", request.sumo)
+        map_path = Path(folder) / "streets.net.xml"
+        site = yield from site_of_extract(source, request.extract_place, map_path, request.sumo)
     found = site.description
     _, described = describe_place(source, site=request.site)
     description = replace(
@@ -220,42 +225,42 @@ def _of_extract(source: Path, request: SiteRequest, map_path: Path | None) -> Ge
         name=described.name or found.name,
         level=request.level,
     )
-    description, more, merging = yield from _with_terrain(site.road_map, description, request)
+    description, more, merging = yield from _with_terrain(site.streets, description, request)
     yield Progress(0, 0, "heights of streets")
     site = replace(site, description=description).on_ground()
     try:
-        model = yield from site_model(site.road_map, site.description)
+        model = yield from street_model(site.streets, site.description)
     except UnclearLevelError as error:
         if map_path is None:
             raise
-        _write_map(with_attribution(site.map_text, site.description.attribution), map_path)
+        _write_map(credited(site.text, site.description.attribution), map_path)
         raise UnclearLevelError(f"{error}; {map_path} is written: the map of the streets there") from error
-    map_text = with_attribution(site.map_text, model.attribution)
+    map_text = credited(site.text, model.attribution)
     return BuiltSite(source.name, replace(model, notes=(*site.notes, *more, *model.notes)), map_text, merging)
 
 
 def _with_terrain(
-    road_map: RoadMap, description: SiteDescription, request: SiteRequest
+    streets: StreetMap, description: SiteDescription, request: SiteRequest
 ) -> Generator[Progress, None, tuple[SiteDescription, tuple[str, ...], tuple[Merging, ...]]]:
     """Add ground and objects from a terrain file to a description."""
     if request.terrain is None:
         return description, (), ()
-    middle, reach = _where(road_map, description)
+    middle, reach = _where(streets, description)
     area = shapely.Point(middle).buffer(reach + SCENE_MARGIN + STANDS_AROUND, quad_segs=16)
-    x, y, z, heading = road_map.header_offset.tolist()
-    reference = GeoReference(road_map.geo_reference or "", (x, y, z, heading))
-    surroundings = MapSurroundings(reference, area, *_roads(road_map, area))
+    x, y, z, heading = streets.road_map.header_offset.tolist()
+    reference = GeoReference(streets.road_map.geo_reference or "", (x, y, z, heading))
+    surroundings = MapSurroundings(reference, area, *_roads(streets, area))
     return (yield from with_terrain(description, request.terrain, surroundings))
 
 
-def _roads(road_map: RoadMap, area: BaseGeometry) -> tuple[Float, BaseGeometry]:
+def _roads(streets: StreetMap, area: BaseGeometry) -> tuple[Float, BaseGeometry]:
     """Return points (n, 3) of the lanes near an area, or of all lanes if none is near, and the carriageway there."""
-    lanes = [lane for road in road_map.roads for lane in lane_surfaces(road)]
-    points = np.concatenate([np.empty((0, 3)), *(edge for lane in lanes for edge in (lane.left, lane.right))])
+    points = np.concatenate([np.empty((0, 3)), *(edge for lane in streets.lanes for edge in (lane.left, lane.right))])
     near = points[shapely.intersects_xy(area, points[:, :2])]
-    paved = road_surface.in_groups(lanes, road_surface.CARRIAGEWAY)
-    there = [shapely.make_valid(lane.polygon) for lane in paved if road_surface.is_near(lane, area)]
-    return near if len(near) else points, shapely.union_all(there)
+    paved = road_surface.in_groups(streets.lanes, road_surface.CARRIAGEWAY)
+    there = [lane.polygon for lane in paved if road_surface.is_near(lane, area)]
+    junctions = [one.carriageway for one in streets.junctions if one.carriageway.intersects(area)]
+    return near if len(near) else points, road_surface.without_crumbs(united([*there, *junctions]))
 
 
 def _of_map(source: Path, request: SiteRequest) -> tuple[Path, RoadMap, SiteDescription]:
@@ -272,13 +277,10 @@ def _of_map(source: Path, request: SiteRequest) -> tuple[Path, RoadMap, SiteDesc
     return map_path, road_map, replace(description, level=request.level) if request.level else description
 
 
-def _where(road_map: RoadMap, description: SiteDescription) -> tuple[Float, float]:
+def _where(streets: StreetMap, description: SiteDescription) -> tuple[Float, float]:
     """Return the centre of a site, (2,) metres, and the largest distance of its region from there."""
-    lanes = [lane for road in road_map.roads for lane in lane_surfaces(road)]
-    description, _ = in_metres(description, road_map, lanes)
-    if description.from_centre_lines:
-        lanes = list(without_plain_joints(lanes))
-    place = Place(road_map, lanes, description)
+    description, _ = in_metres(description, streets.road_map, streets.lanes)
+    place = Place(streets.road_map, streets.lanes, description, streets.junctions)
     x_low, y_low, x_high, y_high = place.within.bounds
     x, y = place.centre.tolist()
     reach = max(abs(x_low - x), abs(x_high - x), abs(y_low - y), abs(y_high - y))

@@ -21,7 +21,7 @@ from seip_addon.core.workflows.network_sites import (
 from seip_addon.core.world.opendrive.read import read_map
 from seip_addon.core.world.openstreetmap.extract import read_extract
 from seip_addon.core.world.streetscape.description import SiteDescription
-from seip_addon.core.world.streetscape.model import site_model
+from tests.builders.map_models import site_model
 from tests.builders.opendrive_text import document, geometry, lane, road, section
 from tests.builders.osm_text import Extract
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 from dataclasses import dataclass, field
 
 from ...acceptance import Acceptance
@@ -81,7 +80,6 @@ class Work:
 
     def __init__(self, effort: float, acceptance: Acceptance | None = None, whole: Work | None = None) -> None:
         self._effort, self._acceptance, self._whole = effort, acceptance, whole
-        self._start = time.perf_counter()
         self.done = 0.0
 
     def spend(self, operations: float) -> None:
@@ -104,8 +102,3 @@ class Work:
         if self._acceptance is not None and self._acceptance.accepted:
             return -1.0
         return self._effort - self.done
-
-    @property
-    def seconds(self) -> float:
-        """Seconds since the start."""
-        return time.perf_counter() - self._start

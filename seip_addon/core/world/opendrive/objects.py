@@ -74,31 +74,24 @@ class PlacedObject:
     outlines: tuple[Outline, ...]
 
 
-def placed_objects(road_map: RoadMap, *, area: BaseGeometry | None = None) -> tuple[PlacedObject, ...]:
+def placed_objects(road_map: RoadMap) -> tuple[PlacedObject, ...]:
     """Return the objects of a map, with repeated objects replaced by their copies.
 
     Parameters
     ----------
     road_map : RoadMap
         Map with the objects.
-    area : shapely geometry, optional
-        Area in plan, map coordinates. Only objects that reach into it are returned.
 
     Raises
     ------
     SeipError
         An object is repeated too often.
     """
-    return tuple(
-        placed
-        for road in road_map.roads
-        for obj in road.objects
-        for placed in _placed(road, obj)
-        if area is None or _extent(placed).intersects(area)
-    )
+    return tuple(placed for road in road_map.roads for obj in road.objects for placed in _placed(road, obj))
 
 
-def _extent(placed: PlacedObject) -> BaseGeometry:
+def extent_in_plan(placed: PlacedObject) -> BaseGeometry:
+    """Return the convex hull in plan of an object's origin and outlines."""
     return MultiPoint(np.vstack([placed.position, *(outline.base for outline in placed.outlines)])[:, :2]).convex_hull
 
 

@@ -5,10 +5,8 @@ Written after ASAM OpenDRIVE 1.4 to 1.8; attributes that a file leaves out have 
 
 import math
 import os
-from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
-from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
@@ -81,12 +79,6 @@ def read_map(path: str | os.PathLike[str]) -> RoadMap:
             if node.text("code", "") == ATTRIBUTION and node.text("value", "")
         ),
     )
-
-
-def with_attribution(text: str, attribution: Iterable[str]) -> str:
-    """Return the text of a map with credits in its header, in the form that `read_map` reads."""
-    elements = "".join(f"<userData code={quoteattr(ATTRIBUTION)} value={quoteattr(one)}/>" for one in attribution)
-    return text.replace("</header>", f"{elements}</header>", 1)
 
 
 def _road(node: Node) -> Road:

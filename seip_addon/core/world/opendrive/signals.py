@@ -3,8 +3,6 @@
 from dataclasses import dataclass
 
 import numpy as np
-from shapely import Point
-from shapely.geometry.base import BaseGeometry
 
 from ...arrays import Float
 from ...errors import SeipError
@@ -42,8 +40,8 @@ class PlacedSignal:
     yaw: float
 
 
-def placed_signals(road_map: RoadMap, *, area: BaseGeometry | None = None) -> tuple[PlacedSignal, ...]:
-    """Return the signals of a map, only those in an area in plan (map coordinates) if one is given.
+def placed_signals(road_map: RoadMap) -> tuple[PlacedSignal, ...]:
+    """Return the signals of a map.
 
     Raises
     ------
@@ -51,8 +49,7 @@ def placed_signals(road_map: RoadMap, *, area: BaseGeometry | None = None) -> tu
         A signal stands on a road that the map does not have.
     """
     roads = {road.id: road for road in road_map.roads}
-    signals = (_placed(road, signal, roads) for road in road_map.roads for signal in road.signals)
-    return tuple(signal for signal in signals if area is None or Point(signal.position[:2]).intersects(area))
+    return tuple(_placed(road, signal, roads) for road in road_map.roads for signal in road.signals)
 
 
 def _placed(owner: Road, signal: RoadSignal, roads: dict[str, Road]) -> PlacedSignal:

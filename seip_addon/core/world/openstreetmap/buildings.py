@@ -6,7 +6,7 @@ ridge, ``min_height`` that of the foot of the walls, and parts replace the outli
 
 import math
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -65,12 +65,15 @@ def buildings(shapes: PlanShapes, area: BaseGeometry, passages: BaseGeometry = _
     for one in found:
         body = one.area
         # Parts describe a building in detail, so the outline around them only remains where no part covers it. A part
-        # belongs to an outline that contains more than half of it: mapped edges do not match exactly.
+        # belongs to an outline that contains more than half of it: mapped edges do not match exactly. A part that
+        # begins at the top of the outline, such as a tower, stands on it.
         if not one.is_part and parts:
+            top = known_height(one.tags) or math.inf
             within = [
                 parts[index].area
                 for index in tree.query(one.area, predicate="intersects")
                 if parts[index].area.intersection(one.area).area > 0.5 * parts[index].area.area
+                and _foot(parts[index].tags) < top
             ]
             if within:
                 body = one.area.difference(shapely.union_all(within))
@@ -83,41 +86,62 @@ def buildings(shapes: PlanShapes, area: BaseGeometry, passages: BaseGeometry = _
     return [solid for solid in solids if solid is not None]
 
 
-def passages(shapes: PlanShapes, carriageway: BaseGeometry) -> BaseGeometry:
-    """Return the part of the carriageway that leads through buildings."""
+def passages(shapes: PlanShapes, carriageway: BaseGeometry, strips: Sequence[BaseGeometry] = ()) -> BaseGeometry:
+    """Return the part of the carriageway that leads through buildings, with that of ways next to it.
+
+    Parameters
+    ----------
+    carriageway : shapely geometry
+        Map coordinates.
+    strips : sequence of shapely geometry
+        Areas of footways, cycle tracks and driveways that lead through buildings.
+    """
     lines = [
         shapes.line(way)
         for way in shapes.extract.ways.values()
         if "highway" in way.tags and way.tags.get("tunnel") == "building_passage"
     ]
     bands = [shapely.LineString(line).buffer(PASSAGE_REACH, cap_style="square") for line in lines if len(line) > 1]
-    return carriageway.intersection(shapely.union_all(bands))
+    return shapely.union_all([carriageway.intersection(shapely.union_all(bands)), *strips])
 
 
 def _footprints(shapes: PlanShapes) -> Iterator[_Footprint]:
     extract = shapes.extract
     drawn: set[int] = set()  # ways that are the outlines of relations
-    known: set[tuple[str, bytes]] = set()
+    known: set[tuple[object, ...]] = set()
     everything: list[Mapping[int, Way | Relation]] = [extract.relations, extract.ways]
     # Relations come first, so that the ways that form their outlines are not read as further buildings.
     for elements in everything:
         for number, element in elements.items():
-            kind = _kind(element.tags)
+            tags = element.tags
+            if isinstance(element, Relation):
+                outlines = {ref for member, ref, role in element.members if member == "way" and role != "inner"}
+                if tags.get("type") != "multipolygon":
+                    continue
+                if _kind(tags) is None:
+                    tags = _tags_of_outlines(shapes, outlines)
+            kind = _kind(tags)
             if kind is None or (number in drawn and isinstance(element, Way)):
-                continue
-            if isinstance(element, Relation) and element.tags.get("type") != "multipolygon":
                 continue
             area = shapes.footprint(element)
             if area is None:
                 continue
             if isinstance(element, Relation):
-                drawn |= {ref for member, ref, role in element.members if member == "way" and role != "inner"}
-            same = (kind, area.normalize().wkb)
+                drawn |= outlines
+            # Parts, and buildings on others, may stand on one outline at different heights.
+            foot, top = _foot(tags), known_height(tags) if kind == "part" else None
+            same = (kind, foot, top, area.normalize().wkb)
             if same in known:
                 shapes.dropped[DRAWN_TWICE] += 1
                 continue
             known.add(same)
-            yield _Footprint(area, element.tags, kind == "part")
+            yield _Footprint(area, tags, kind == "part")
+
+
+def _tags_of_outlines(shapes: PlanShapes, outlines: Collection[int]) -> Tags:
+    """Return the tags of the outlines of a multipolygon without own tags, as in older data; empty if they differ."""
+    ways = [shapes.extract.ways[number].tags for number in outlines if number in shapes.extract.ways]
+    return ways[0] if ways and all(tags == ways[0] for tags in ways) else {}
 
 
 def _kind(tags: Tags) -> str | None:
@@ -140,6 +164,12 @@ def known_height(tags: Tags) -> float | None:
     return levels * STOREY + (_roof_height(tags) or USUAL_ROOF if _is_roofed(tags) else 0.0)
 
 
+def _foot(tags: Tags) -> float:
+    """Return the height of the foot of a building's walls above the ground, metres."""
+    base = metres(tags.get("min_height", tags.get("building:min_height")), MAX_HEIGHT)
+    return STOREY * (count(tags.get("building:min_level"), MAX_LEVELS) or 0.0) if base is None else base
+
+
 def _usual_height(tags: Sequence[Tags]) -> float:
     known = [height for one in tags if _low(one) is None and (height := known_height(one)) is not None]
     return float(np.median(known)) if len(known) >= MIN_KNOWN else USUAL_HEIGHT
@@ -152,9 +182,7 @@ def _low(tags: Tags) -> float | None:
 def _building(outline: shapely.Polygon, tags: Tags, usual: float, least: float, *, is_part: bool) -> Building | None:
     """Return a building, or a part, that begins at ``least`` metres or higher; None if it ends below that."""
     height, is_known = known_height(tags), True
-    base = metres(tags.get("min_height", tags.get("building:min_height")), MAX_HEIGHT)
-    if base is None:
-        base = STOREY * (count(tags.get("building:min_level"), MAX_LEVELS) or 0.0)
+    base = _foot(tags)
     if height is None:
         is_known, height = False, _low(tags) or usual
     canopy = "roof" in (tags.get("building"), tags.get("building:part")) or tags.get("building") == "carport"

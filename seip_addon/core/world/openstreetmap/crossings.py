@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 from ..opendrive.junctions import STREETS
 from .extract import Extract, rings
-from .streets import importance, is_roundabout, is_street
+from .street_lanes import is_roundabout
+from .streets import importance, is_street
 
 ONE_CROSSING = 60.0  # metres: nodes of the same streets within this distance are one crossing (dual carriageways)
 EARTH_RADIUS = 6_371_000.0  # metres

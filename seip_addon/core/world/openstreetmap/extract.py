@@ -23,7 +23,7 @@ _OTHER_FORMATS = {
     b"PK\x03\x04": "is a zip archive; unpack it",
     b"\xfd7zXZ": "is compressed with xz; unpack it (unxz)",
     b"BLENDER": "is a .blend file, not an extract; open it in Blender",
-    b"{": "is JSON; download the place as OpenStreetMap XML (.osm)",
+    b"{": "is JSON; download the place as OpenStreetMap XML (.osm), from Overpass with [out:xml]",
 }
 """First bytes of other formats that are given in place of an extract, and what to do with such a file."""
 PBF_START = b"\x00\x00\x00"
@@ -35,6 +35,9 @@ MAX_ID = 2**62
 OPENSTREETMAP = "© OpenStreetMap contributors (ODbL)"
 _DAY = re.compile(r"\d{4}-\d\d-\d\d(?=T|$)")
 _NO_TAGS: Mapping[str, str] = MappingProxyType({})
+_OTHER_SIDE = {"forward": "backward", "backward": "forward", "left": "right", "right": "left"}
+_SIDED_KEYS = ("sidewalk", "cycleway", "busway")
+"""Keys of which a value ``left`` or ``right`` is a side of the way."""
 
 NEXT_NODE = 3_000.0  # metres beyond a window within which the next node of a street that leaves it is looked for
 
@@ -63,6 +66,26 @@ class Way:
     def is_closed(self) -> bool:
         """Whether the way is a ring: its last node is its first."""
         return len(self.nodes) > 3 and self.nodes[0] == self.nodes[-1]
+
+
+def reversed_tags(tags: Tags) -> dict[str, str]:
+    """Return the tags of the same way with its nodes in the opposite order.
+
+    Lists of lanes are in driving direction, so that they stay as they are.
+    """
+    return {
+        ":".join(_OTHER_SIDE.get(part, part) for part in key.split(":")): (
+            _OTHER_SIDE.get(value, value) if key in _SIDED_KEYS else value
+        )
+        for key, value in tags.items()
+    }
+
+
+def _in_driving_direction(way: Way) -> Way:
+    """Return a way with its nodes in the order in which traffic passes them, if it is drawn against its traffic."""
+    if way.tags.get("oneway") not in ("-1", "reverse"):
+        return way
+    return Way(way.nodes[::-1], reversed_tags(way.tags) | {"oneway": "yes"})
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -112,10 +135,18 @@ class _Collector:
         self.ways: dict[int, Way] = {}
         self.relations: dict[int, Relation] = {}
         self.repeated = self.near = self.misplaced = 0
+        self.has_nodes = self.has_inline_nodes = False
+        """Whether the file has nodes, and ways with the coordinates of their nodes (Overpass's ``out geom``)."""
         self.holder = self.date = self.newest = ""
         self._name, self._within = name, within
         self._middle = None if within is None else (within[1] + within[3]) / 2
         """Longitude around which others are unwrapped, so that places on both sides of the date line are neighbours."""
+
+    @property
+    def lacks_nodes(self) -> bool:
+        """Whether the file has ways, and none of their nodes."""
+        refs = itertools.chain.from_iterable(way.nodes for way in self.ways.values())
+        return bool(self.ways) and (self.has_inline_nodes or not self.has_nodes) and self.nodes.keys().isdisjoint(refs)
 
     @property
     def attribution(self) -> str:
@@ -128,6 +159,7 @@ class _Collector:
 
     def add_node(self, number: int, latitude: float, longitude: float, tags: Tags) -> None:
         """Add a node unless it is far from the window; NaN coordinates count as misplaced."""
+        self.has_nodes = True
         if not (abs(latitude) <= MAX_LATITUDE and abs(longitude) <= 180.0):
             self.misplaced += 1
             return
@@ -137,22 +169,37 @@ class _Collector:
         # Ways refer to nodes before it is known which nodes they need, so nodes are kept in a wider band: the next
         # node of a street that leaves the window may lie far beyond its edge. `cropped` removes the rest.
         if self._is_within(latitude, longitude, NEXT_NODE):
-            self.repeated += number in self.nodes
-            self.near += self._is_within(latitude, longitude)
-            self.nodes[number] = Node(latitude, longitude, tags)
+            known = self.nodes.get(number)
+            self.near += known is None and self._is_within(latitude, longitude)
+            moved = known is not None and (known.latitude, known.longitude) != (latitude, longitude)
+            self.nodes[number] = Node(latitude, longitude, self._merged(known, tags, moved=moved))
             self._check_size()
 
     def add_way(self, number: int, nodes: tuple[int, ...], tags: Tags) -> None:
         """Add a way."""
-        self.repeated += number in self.ways
-        self.ways[number] = Way(nodes, tags)
+        known = self.ways.get(number)
+        nodes = nodes or (known.nodes if known else ())
+        moved = known is not None and bool(known.nodes) and known.nodes != nodes
+        self.ways[number] = Way(nodes, self._merged(known, tags, moved=moved))
         self._check_size()
 
     def add_relation(self, number: int, members: tuple[tuple[str, int, str], ...], tags: Tags) -> None:
         """Add a relation."""
-        self.repeated += number in self.relations
-        self.relations[number] = Relation(members, tags)
+        known = self.relations.get(number)
+        members = members or (known.members if known else ())
+        moved = known is not None and bool(known.members) and known.members != members
+        self.relations[number] = Relation(members, self._merged(known, tags, moved=moved))
         self._check_size()
+
+    def _merged(self, known: Node | Way | Relation | None, tags: Tags, *, moved: bool) -> Tags:
+        """Return the tags of an element, and count it if its copies contradict each other.
+
+        Overpass writes an element once with tags and once without (``out body; >; out skel``): the tags are kept.
+        """
+        if known is None:
+            return tags
+        self.repeated += moved or bool(tags and known.tags and tags != known.tags)
+        return tags or known.tags
 
     def changed(self, time: str) -> None:
         """Note the time stamp (ISO 8601) of an element."""
@@ -211,6 +258,11 @@ def read_extract(path: Path, within: Window | None = None) -> Generator[Progress
         yield from _read_pbf(path, collected, everything=within is None)
     else:
         yield from _read_xml(path, collected)
+    if collected.lacks_nodes:
+        raise SeipError(
+            f"{path.name} has ways without nodes: query Overpass with `out body; >; out skel qt;`, not `out geom`, "
+            "or export the place from openstreetmap.org"
+        )
     if not collected.nodes or collected.near == 0:
         if within is None:
             raise SeipError(f"{path.name} has no node: take an extract that holds the place")
@@ -219,15 +271,14 @@ def read_extract(path: Path, within: Window | None = None) -> Generator[Progress
         )
     notes = []
     if collected.repeated:
-        notes.append(f"{path.name} has {counted(collected.repeated, 'element')} twice: the later one is used")
+        notes.append(f"{path.name} has two versions of {counted(collected.repeated, 'element')}: the later one is used")
     if collected.misplaced:
         notes.append(
             f"{path.name} has {counted(collected.misplaced, 'node')} without valid coordinates below {MAX_LATITUDE:g} "
             "degrees of latitude, which were skipped"
         )
-    extract = Extract(
-        path.name, collected.nodes, collected.ways, collected.relations, tuple(notes), collected.attribution
-    )
+    ways = {number: _in_driving_direction(way) for number, way in collected.ways.items()}
+    extract = Extract(path.name, collected.nodes, ways, collected.relations, tuple(notes), collected.attribution)
     return extract if within is None else cropped(extract, within)
 
 
@@ -255,7 +306,11 @@ def cropped(extract: Extract, within: Window) -> Extract:
 def _read_xml(path: Path, into: _Collector) -> Generator[Progress, None, None]:
     reader = _XmlReader(path.name, into)
     yield from read_tags(path, reader.start, reader.end, cure="download the extract again")
-    if reader.root not in ("osm", "osmChange"):
+    if reader.root == "osmChange":
+        raise SeipError(
+            f"{path.name} is a list of changes, not an extract: download the place as OpenStreetMap XML (.osm)"
+        )
+    if reader.root != "osm":
         raise SeipError(
             f"{path.name} is not an extract of OpenStreetMap: its first element is <{reader.root[:40]}>; "
             "download the place as OpenStreetMap XML (.osm)"
@@ -290,6 +345,7 @@ class _XmlReader:
             self._tags[attributes.get("k", "")] = one_line(attributes.get("v", "")[:MAX_TAG])
         elif tag == "nd":
             self._refs.append(self._id(attributes, "ref"))
+            self._into.has_inline_nodes |= "lat" in attributes
         elif tag == "member":
             self._members.append((attributes.get("type", ""), self._id(attributes, "ref"), attributes.get("role", "")))
 
@@ -421,9 +477,11 @@ def _first_bytes(path: Path) -> bytes:
     """Return the first bytes of a file, after a check that they are not those of another format."""
     try:
         with path.open("rb") as file:
-            start = file.read(16)
+            start = file.read(1000)
     except OSError:
         return b""  # the reader names the fault
+    if b'"CityJSON"' in start:
+        raise SeipError(f"{path.name} is CityJSON, a model of buildings, not an extract: choose an .osm file")
     for mark, cure in _OTHER_FORMATS.items():
         if start.lstrip(b"\xef\xbb\xbf \t\r\n" if mark == b"{" else b"").startswith(mark):
             raise SeipError(f"{path.name} {cure}")

@@ -26,11 +26,12 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from ...arrays import Boolean, Float, Integer
-from ..elevation.raised_map import Profiles
 from ..opendrive.lanes import LaneSurface
 from ..opendrive.road_map import Road, RoadLink, RoadMap
 from ..streetscape.road_surface import CARRIAGEWAY, in_groups
+from ..streetscape.street_map import Profiles
 from .bridges import Crossing, Structures, corridors
+from .edge_lines import way_id
 from .extract import Tags, Way
 from .plan_shapes import PlanShapes
 from .streets import StreetFile
@@ -206,7 +207,7 @@ class _Network:
             self.limits[other].append((one, allowed))
 
     def _strand(self, nodes: Integer, roads: tuple[tuple[Road, bool], ...]) -> _Strand:
-        number = _way_id(self.sources.get(roads[0][0].id, ""))
+        number = way_id(self.sources.get(roads[0][0].id, ""))
         way = self.ways.get(number)
         tags: Tags = way.tags if way is not None else {}
         grade = LINK_GRADE if tags.get("highway", "").endswith("_link") else GRADE
@@ -559,9 +560,3 @@ def _across(lanes: Sequence[LaneSurface], along: Float) -> list[Float]:
             for edge in (lane.left, lane.right)
         ]
     return found
-
-
-def _way_id(source: str) -> int:
-    """Return the id of the way that a road was made from, 0 if it is unknown."""
-    digits = "".join(itertools.takewhile(str.isdigit, source.removeprefix("-")))
-    return int(digits) if digits else 0

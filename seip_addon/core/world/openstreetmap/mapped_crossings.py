@@ -1,10 +1,10 @@
-"""Pedestrian crossings in the map of an extract: mapped crossings replace those that netconvert guesses."""
+"""Pedestrian crossings of the streets of an extract: mapped crossings replace those that netconvert guesses."""
 
 import itertools
 import math
 import re
 from collections import Counter
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,11 +13,13 @@ from shapely.geometry.base import BaseGeometry
 
 from ...arrays import Float
 from ..opendrive.lanes import LaneSurface
-from ..opendrive.road_map import Road, RoadMap, RoadObject
-from ..streetscape.named_places import ASSUMED_CROSSING, CROSSING
+from ..opendrive.objects import PlacedObject
+from ..streetscape.named_places import ASSUMED_CROSSING
 from ..streetscape.road_surface import CARRIAGEWAY, MAX_SEAM, in_groups
+from ..streetscape.street_map import StreetMap
 from .extract import Extract
 from .keep_off import CROSSING_WIDTH, MAX_CROSSING_LENGTH, MAX_CROSSING_WIDTH
+from .network_map import crossing
 from .plan_shapes import PlanShapes
 from .quantities import metres
 from .streets import StreetFile
@@ -25,12 +27,8 @@ from .streets import StreetFile
 MAPPED_AROUND = 40.0  # metres from a mapped crossing within which no crossing is guessed
 MAX_AWAY = 15.0  # metres from a crossing to the lanes of its street: in the map these end where a junction begins
 ALONG_STREET = math.radians(30.0)  # between a crossed street and its lanes
-LINE_STEP = 1.0  # metres between the points of a road among which the nearest to a crossing is found
-_OBJECTS = re.compile(r"<objects\s*/>|<objects>.*?</objects>", re.DOTALL)
-_ROAD = re.compile(r'<road [^>]*?id="([^"]*)".*?</road>', re.DOTALL)
 _GUESSED_AT = re.compile(r":(.*)_c\d+")
 """Id of a crossing that netconvert guesses: the name of its junction, and its number there."""
-_GUESSED = re.compile(r'<object id="([^"]*)" type="crosswalk".*?</object>\s*', re.DOTALL)
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,51 +41,38 @@ class _Crossed:
     depth: float
 
 
-def with_mapped_crossings(
-    road_map: RoadMap,
-    text: str,
-    lanes: Mapping[str, Sequence[LaneSurface]],
-    streets: StreetFile,
-    shapes: PlanShapes,
-    joints: Collection[str] = (),
-) -> tuple[RoadMap, str]:
-    """Return a map, and its text, with the crossings of the extract.
+def with_mapped_crossings(streets: StreetMap, source: StreetFile, shapes: PlanShapes) -> StreetMap:
+    """Return streets with the crossings of the extract.
 
     A guessed crossing remains where streets meet and the extract maps none nearby; its name marks it as assumed.
 
     Parameters
     ----------
-    road_map : RoadMap
-        Map of the streets.
-    text : str
-        The same map as text.
-    lanes : mapping of str to sequence of LaneSurface
-        Lanes of each road of the map by its id.
-    streets : StreetFile
-        Streets that the map was made from.
+    streets : StreetMap
+        Streets of a network.
+    source : StreetFile
+        Streets that the network was made from.
     shapes : PlanShapes
         Shapes of the extract in map coordinates.
-    joints : collection of str
-        Names of junctions where a street only continues: crossings guessed there have no evidence.
     """
-    driven = [lane for own in lanes.values() for lane in in_groups(own, CARRIAGEWAY) if lane.junction_id is None]
-    crossed = [_on_carriageway(one, driven) for one in _crossed_places(streets, shapes)]
-    own = _by_road(crossed, road_map)
-    mapped = shapely.union_all(shapely.points(np.array([one.middle for one in crossed]).reshape(-1, 2)))
-    roads = tuple(
-        replace(road, objects=(*_kept(road, mapped, joints), *own.get(road.id, ()))) for road in road_map.roads
-    )
-    return replace(road_map, roads=roads), _written(text, roads)
-
-
-def guessed_crossings(road_map: RoadMap, area: BaseGeometry) -> int:
-    """Return the number of assumed crossings of a map in an area."""
-    places = [
-        shapely.Point(road.place(np.array([one.s]), np.array([one.t]))[0, :2])
-        for road in road_map.roads
-        for one in road.objects
-        if one.kind == CROSSING and one.name == ASSUMED_CROSSING
+    driven = [lane for lane in in_groups(streets.lanes, CARRIAGEWAY) if lane.junction_id is None]
+    mapped = [_on_carriageway(one, driven) for one in _crossed_places(source, shapes)]
+    places = shapely.multipoints(np.array([one.position[:2] for one in mapped]).reshape(-1, 2))
+    joints = {one.id for one in streets.junctions if one.is_joint}
+    guessed = [
+        replace(one, name=ASSUMED_CROSSING)
+        for one in streets.objects
+        # Crossings guessed where a street only continues have no evidence.
+        if (found := _GUESSED_AT.fullmatch(one.id)) is not None
+        and found[1] not in joints
+        and not places.dwithin(shapely.Point(one.position[:2]), MAPPED_AROUND)
     ]
+    return replace(streets, objects=(*mapped, *guessed))
+
+
+def guessed_crossings(streets: StreetMap, area: BaseGeometry) -> int:
+    """Return the number of assumed crossings of streets in an area."""
+    places = [shapely.Point(one.position[:2]) for one in streets.objects if one.name == ASSUMED_CROSSING]
     return int(shapely.intersects(area, places).sum())
 
 
@@ -127,18 +112,7 @@ def _crossing_nodes(extract: Extract) -> Iterator[tuple[int, float]]:
             yield number, metres(node.tags.get("width"), MAX_CROSSING_WIDTH) or CROSSING_WIDTH
 
 
-@dataclass(frozen=True, eq=False)
-class _Laid:
-    """A crossing fitted to the carriageway: its node, middle (2,), street heading, and size along and across it."""
-
-    node: int
-    middle: Float
-    heading: float
-    depth: float
-    width: float
-
-
-def _on_carriageway(crossed: _Crossed, lanes: Sequence[LaneSurface]) -> _Laid:
+def _on_carriageway(crossed: _Crossed, lanes: Sequence[LaneSurface]) -> PlacedObject:
     """Return a crossing that spans the carriageway of its street from edge to edge.
 
     Its width is measured where the lanes of the street are nearest: in the map, a junction may begin before it.
@@ -167,8 +141,13 @@ def _on_carriageway(crossed: _Crossed, lanes: Sequence[LaneSurface]) -> _Laid:
         if part is not None and part.dwithin(shapely.Point(middle), MAX_AWAY):
             centre = shapely.get_coordinates(part).mean(axis=0)
             moved = crossed.middle + float((centre - middle) @ aside) * aside
-            return _Laid(crossed.node, moved, heading, crossed.depth, part.length - 2 * MAX_SEAM)
-    return _Laid(crossed.node, crossed.middle, heading, crossed.depth, 2 * CROSSING_WIDTH)
+            return _crossing(crossed, moved, part.length - 2 * MAX_SEAM)
+    return _crossing(crossed, crossed.middle, 2 * CROSSING_WIDTH)
+
+
+def _crossing(crossed: _Crossed, middle: Float, width: float) -> PlacedObject:
+    across = width / 2 * np.array([-crossed.along[1], crossed.along[0]])
+    return crossing(f"crossing {crossed.node}", "", np.array([middle - across, middle + across]), crossed.depth)
 
 
 def _is_along(lane: LaneSurface, heading: float) -> bool:
@@ -176,81 +155,3 @@ def _is_along(lane: LaneSurface, heading: float) -> bool:
     x, y = np.diff((lane.left + lane.right)[:, :2], axis=0).T
     turns = np.arctan2(y, x) - heading
     return bool((np.abs(np.remainder(turns + math.pi / 2, math.pi) - math.pi / 2) < ALONG_STREET).any())
-
-
-def _by_road(crossed: Sequence[_Laid], road_map: RoadMap) -> dict[str, list[RoadObject]]:
-    """Return the crossings as road objects, by the id of the nearest road."""
-    if not crossed:
-        return {}
-    roads = [road for road in road_map.roads if road.length > 0.0]
-    places = [np.linspace(0.0, road.length, 2 + int(road.length / LINE_STEP)) for road in roads]
-    lines = [shapely.LineString(road.frame(s).origin[:, :2]) for road, s in zip(roads, places, strict=True)]
-    tree = shapely.STRtree(lines)
-    found: dict[str, list[RoadObject]] = {}
-    for one in crossed:
-        point = shapely.Point(one.middle)
-        index = int(tree.nearest(point))
-        found.setdefault(roads[index].id, []).append(_object(one, roads[index], lines[index].project(point)))
-    return found
-
-
-def _object(crossed: _Laid, road: Road, s: float) -> RoadObject:
-    frame = road.frame(np.array([s]))
-    away = crossed.middle - frame.origin[0, :2]
-    return RoadObject(
-        id=f"crossing {crossed.node}",
-        name="",
-        kind=CROSSING,
-        s=round(s, 4),
-        t=round(float(away @ frame.level_left[0, :2]), 4),
-        z_offset=0.0,
-        heading=round(math.remainder(crossed.heading - float(frame.heading[0]), math.tau), 6),
-        pitch=0.0,
-        roll=0.0,
-        length=round(crossed.depth, 3),
-        width=round(crossed.width, 3),
-        height=0.0,
-        radius=0.0,
-        outlines=(),
-        repeats=(),
-    )
-
-
-def _kept(road: Road, mapped: BaseGeometry, joints: Collection[str]) -> Iterator[RoadObject]:
-    """Yield the objects of a road except guessed crossings at joints and near mapped crossings."""
-    for one in road.objects:
-        if one.kind != CROSSING:
-            yield one
-        elif (of := _GUESSED_AT.fullmatch(one.id)) is not None and of[1] in joints:
-            continue
-        elif not mapped.dwithin(shapely.Point(road.place(np.array([one.s]), np.array([one.t]))[0, :2]), MAPPED_AROUND):
-            yield replace(one, name=ASSUMED_CROSSING)
-
-
-def _written(text: str, roads: Sequence[Road]) -> str:
-    """Return the text of a map of netconvert with the crossings of `roads`."""
-    objects = {road.id: road.objects for road in roads}
-
-    def road_text(match: re.Match[str]) -> str:
-        # Guessed crossings are removed from the text or marked by a name; mapped ones, which have no outline, are
-        # added.
-        kept = {one.id for one in objects[match[1]]}
-        new = "".join(_element(one) for one in objects[match[1]] if not one.outlines)
-
-        def crossings(part: re.Match[str]) -> str:
-            content = part[0].removeprefix("<objects>").removesuffix("</objects>") * (not part[0].endswith("/>"))
-            named = _GUESSED.sub(
-                lambda one: one[0].replace('id="', f'name="{ASSUMED_CROSSING}" id="', 1) * (one[1] in kept), content
-            )
-            return f"<objects>{named}{new}</objects>" if named.strip() or new else "<objects/>"
-
-        return _OBJECTS.sub(crossings, match[0], count=1)
-
-    return _ROAD.sub(road_text, text)
-
-
-def _element(crossing: RoadObject) -> str:
-    return (
-        f'<object id="{crossing.id}" type="{crossing.kind}" s="{crossing.s}" t="{crossing.t}" '
-        f'hdg="{crossing.heading}" length="{crossing.length}" width="{crossing.width}"/>'
-    )

@@ -14,7 +14,8 @@ from ...geometry.tangent_plane import plan_metres
 from .crossings import Crossing, named_crossings
 from .extract import Extract, Tags
 from .signals import SIGNAL_REACH
-from .streets import CLASSES, is_roundabout, is_street
+from .street_lanes import is_roundabout
+from .streets import CLASSES, is_street
 
 CLASS_RULES = tuple(kind for kind in CLASSES if not kind.endswith("_link"))
 RULES = ("all", "signals", "roundabouts", *CLASS_RULES)

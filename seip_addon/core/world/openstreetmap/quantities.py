@@ -5,9 +5,11 @@ import re
 _METRES = {"": 1.0, "m": 1.0, "metre": 1.0, "metres": 1.0, "meter": 1.0, "meters": 1.0, "cm": 0.01, "km": 1000.0}
 _FOOT, _INCH = 0.3048, 0.0254
 _PLAIN = re.compile(r"([+-]?\d+(?:[.,]\d+)?)\s*([a-z]*)")
-_FEET = re.compile(
-    r"(\d+(?:\.\d+)?)\s*(?:'|\u2032|ft|feet|foot)\.?\s*(?:(\d+(?:\.\d+)?)\s*(?:\"|\u2033|''|in|inch|inches)\.?)?"
-)
+_NUMBER, _INCHES = r"(\d+(?:[.,]\d+)?)", r"\s*(?:\"|''|in|inch|inches)\.?"
+_FEET = re.compile(rf"{_NUMBER}\s*(?:'|ft|feet|foot)\.?\s*(?:{_NUMBER}(?:{_INCHES})?)?")
+_ONLY_INCHES = re.compile(_NUMBER + _INCHES)
+_SIGNS = str.maketrans({"\u2032": "'", "\u2019": "'", "\u2033": '"', "\u201d": '"', "\u00a0": " ", "~": ""})
+"""Prime and quotation marks of typography that stand for feet and inches, and signs to leave out."""
 
 
 def metres(text: str | None, most: float) -> float | None:
@@ -25,7 +27,7 @@ def metres(text: str | None, most: float) -> float | None:
     float or None
         None if the text has no length above zero and up to ``most``.
     """
-    lengths = [_metres(one.strip().lower()) for one in (text or "").split(";")]
+    lengths = [_metres(one.strip().lower()) for one in (text or "").translate(_SIGNS).split(";")]
     sound = [length for length in lengths if length is not None and 0.0 < length <= most]
     return max(sound, default=None)
 
@@ -43,7 +45,9 @@ def _metres(text: str) -> float | None:
         if unit is not None:
             return unit * _number(match[1])
     if match := _FEET.fullmatch(text):
-        return _FOOT * float(match[1]) + _INCH * float(match[2] or 0.0)
+        return _FOOT * _number(match[1]) + _INCH * _number(match[2] or "0")
+    if match := _ONLY_INCHES.fullmatch(text):
+        return _INCH * _number(match[1])
     return None
 
 

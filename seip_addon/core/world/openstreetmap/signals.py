@@ -14,7 +14,6 @@ from .extract import Extract, Tags, Way
 SIGNAL_REACH = 40.0  # metres from a stop line to the junction that its signals control, at most
 CROSSING_REACH = 15.0  # metres: the same for signals of a pedestrian crossing, which need not belong to a junction
 BEHIND_REACH = 15.0  # metres from signals back to the junction that they stand behind, at most
-_REVERSED = ("-1", "reverse")
 
 
 @dataclass(frozen=True)
@@ -90,12 +89,12 @@ def _direction(tags: Tags) -> str | None:
 
 def _ahead(way: Way, place: int, tags: Tags) -> Iterator[int]:
     """Yield the nodes next to signals towards which the controlled traffic drives."""
-    oneway = way.tags.get("oneway", "no")
-    direction = _direction(tags)
-    one_way = oneway in ("yes", "true", "1") or way.tags.get("junction") in ("roundabout", "circular")
-    if place + 1 < len(way.nodes) and oneway not in _REVERSED and direction != "backward":
+    one_way = way.tags.get("oneway") in ("yes", "true", "1") or way.tags.get("junction") in ("roundabout", "circular")
+    # The direction of a signal is that of the mapped way, which is reversed where traffic goes against it.
+    direction = "forward" if one_way else _direction(tags)
+    if place + 1 < len(way.nodes) and direction != "backward":
         yield way.nodes[place + 1]
-    if place > 0 and not one_way and direction != "forward":
+    if place > 0 and direction != "forward":
         yield way.nodes[place - 1]
 
 

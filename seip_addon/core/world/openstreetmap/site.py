@@ -16,42 +16,34 @@ from ...arrays import Float
 from ...counts import counted
 from ...errors import SeipError
 from ...geometry.geo_reference import TransverseMercator, projection
+from ...geometry.plan import united
 from ...progress import Progress
 from ...site.scene_geometry import FROM_EXTRACT
-from ..elevation.raised_map import raised_map, raised_text
 from ..opendrive.junctions import STREETS, nearest_junctions, streets_of_junctions
 from ..opendrive.lanes import LaneSurface, lane_surfaces
-from ..opendrive.read import read_map
-from ..opendrive.road_map import RoadMap
+from ..opendrive.road_map import Junction, RoadMap
 from ..streetscape import road_surface
 from ..streetscape.description import DEFAULT_RADIUS, SiteDescription
-from ..streetscape.intersections import SAME_DIRECTION, TOUCH, intersection, without_plain_joints
+from ..streetscape.intersections import SAME_DIRECTION, TOUCH, intersection
 from ..streetscape.levels import UNNAMED_ROAD
 from ..streetscape.named_places import street_names
 from ..streetscape.place import SCENE_MARGIN
+from ..streetscape.street_map import StreetMap
 from ..streetscape.terrain import FlatLand
 from .extract import EARTH_RADIUS, MAX_LATITUDE, Extract, Node, Way, cropped, read_extract, window
 from .heights import StreetHeights, has_heights, street_heights
 from .mapped_crossings import guessed_crossings, with_mapped_crossings
 from .netconvert import convert
+from .network_map import NetworkMap, read_network_map
 from .plan_shapes import PlanShapes
 from .signals import SIGNAL_REACH
+from .street_lanes import has_lane_count, has_widths, implausible_lanes, lane_counts, shares_lane, usual_lanes
 from .street_objects import surroundings
-from .streets import (
-    CLASSES,
-    StreetFile,
-    has_lane_count,
-    has_widths,
-    implausible_lanes,
-    is_street,
-    is_tunnel,
-    lane_counts,
-    shown_name,
-    usual_lanes,
-    write_streets,
-)
+from .streets import CLASSES, SHORT_PIECE, StreetFile, is_street, is_tunnel, shown_name, write_streets
 
-EXTRACT_SUFFIXES = (".osm", ".osm.gz", ".osm.pbf", ".osm.xml")
+EXTRACT_SUFFIXES = (".osm", ".osm.gz", ".osm.xml", ".pbf")
+OTHER_SUFFIXES = (".json", ".geojson", ".osc", ".osc.gz", ".osm.bz2", ".osm.zip")
+"""Suffixes of OpenStreetMap data in formats that `read_extract` refuses with the cure."""
 STREET_REACH = 450.0  # metres beyond the region within which streets are laid out: traffic comes from there
 MAX_JUNCTION_DISTANCE = 60.0  # metres from a requested place to its junction at most
 NAMES = ("name", "name:en", "alt_name", "ref")
@@ -105,8 +97,8 @@ class ExtractPlace:
 
 
 def is_extract(path: Path) -> bool:
-    """Return whether a file name is that of an extract."""
-    return path.name.lower().endswith((*EXTRACT_SUFFIXES, ".pbf"))
+    """Return whether a file name is that of an extract, or of OpenStreetMap data in a format that is not supported."""
+    return path.name.lower().endswith((*EXTRACT_SUFFIXES, *OTHER_SUFFIXES))
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,65 +107,63 @@ class ExtractSite:
 
     Parameters
     ----------
-    road_map : RoadMap
-        Map of the streets made by netconvert: flat, unless the extract has heights.
-    map_text : str
-        The same map as text.
+    streets : StreetMap
+        Streets as netconvert lays them out, with the crossings of the extract: flat, unless the extract has heights.
+    network : NetworkMap
+        Network of these streets.
+    text : str
+        Text of the network, on which traffic is simulated.
     description : SiteDescription
         Objects next to the streets, and the extent of the region.
     notes : tuple of str
         Messages about assumptions and omissions.
-    streets : StreetFile
+    source : StreetFile
         Streets as written for netconvert.
-    sources : mapping of str to str
-        Way that each road was made from, as returned by `netconvert.convert`.
     shapes : PlanShapes
         Shapes of the extract in map coordinates.
-    lanes : mapping of str to tuple of LaneSurface
-        Lanes of each road of the map by its id.
     area : shapely geometry
         Area that notes refer to, about the region of interest; map coordinates.
     """
 
-    road_map: RoadMap
-    map_text: str
+    streets: StreetMap
+    network: NetworkMap
+    text: str
     description: SiteDescription
     notes: tuple[str, ...]
-    streets: StreetFile
-    sources: Mapping[str, str]
+    source: StreetFile
     shapes: PlanShapes
-    lanes: Mapping[str, tuple[LaneSurface, ...]]
     area: BaseGeometry
 
     def on_ground(self) -> "ExtractSite":
         """Return the same site with its streets raised to the ground, onto bridges and into underpasses."""
-        relief = self.description.relief
+        relief, road_map = self.description.relief, self.streets.road_map
         ground = None if relief is None else relief.rise
-        heights = street_heights(self.road_map, self.lanes, self.sources, self.streets, self.shapes, ground)
+        # An edge has the id of the way that it was made from, with a minus sign if it leads the opposite way.
+        sources = {road.id: road.id for road in road_map.roads}
+        lanes = road_surface.by_road(self.streets.lanes)
+        heights = street_heights(road_map, lanes, sources, self.source, self.shapes, ground)
         raised = replace(self, notes=(*self.notes, *heights.notes, *self._ramp_notes(heights)))
         is_raised = any(along_road.any() for _, along_road in heights.profiles.values())
         if is_raised:
-            raised = replace(
-                raised,
-                road_map=raised_map(self.road_map, heights.above_ground),
-                map_text=raised_text(self.map_text, self.road_map, heights.profiles),
-            )
+            streets = self.streets.raised(heights.above_ground)
+            raised = replace(raised, streets=streets, text=self.network.raised_text(heights.profiles))
         if relief is not None:
             relief = replace(relief, bridges=heights.bridges)
             return replace(raised, description=replace(self.description, relief=relief))
-        if is_raised and not has_heights(self.road_map):
+        if is_raised and not has_heights(road_map):
             land = FlatLand(0.0, heights.bridges)
             return replace(raised, description=replace(self.description, flat_land=land))
         return raised
 
     def _ramp_notes(self, heights: StreetHeights) -> Iterator[str]:
         """Yield a note on the assumed heights of bridges, underpasses and their ramps in the area."""
-        names = street_names(self.road_map)
+        road_map = self.streets.road_map
+        names = street_names(road_map)
         moved: dict[str, float] = {}
         for number, (along, above) in heights.above_ground.items():
             if not np.abs(above).max() >= MIN_RAMP:
                 continue
-            (road,) = (road for road in self.road_map.roads if road.id == number)
+            (road,) = (road for road in road_map.roads if road.id == number)
             places = shapely.points(road.frame(along).origin[:, :2])
             near = above[shapely.intersects(self.area, places)]
             if len(near) and np.abs(near).max() >= MIN_RAMP and road.junction_id is None:
@@ -194,7 +184,7 @@ class ExtractSite:
 def site_of_extract(
     path: Path, place: ExtractPlace, map_path: Path, sumo: Iterable[Path] = ()
 ) -> Generator[Progress, None, ExtractSite]:
-    """Make a map of the streets of an extract around a place, and a description of the objects there.
+    """Lay out the streets of an extract around a place, and describe the objects there.
 
     Parameters
     ----------
@@ -203,7 +193,7 @@ def site_of_extract(
     place : ExtractPlace
         Place to study.
     map_path : Path
-        Map of the streets to write (.xodr). A temporary file is written next to it.
+        Network of the streets to write (.net.xml). A temporary file is written next to it.
     sumo : iterable of Path
         Folders to search for SUMO first.
 
@@ -212,99 +202,165 @@ def site_of_extract(
     SeipError
         The extract cannot be read, or lacks the place or a street there, or SUMO is missing.
     """
-    if place.near is None and not place.streets:
-        raise SeipError(f'{path.name} needs a place: --near-latlon LAT LON, or --junction "One Street" "Other Street"')
-    _check(place)
-    # Streets are laid out well beyond the region, for traffic; 200 m more hold the junction that was named, whose
-    # centre may lie away from the place.
-    most = place.reach + STREET_REACH + 200.0
-    extract = yield from read_extract(path, None if place.near is None else window(*place.near, most))
-    near, place_notes = (place.near, ()) if place.near else _meeting_place(extract, place.streets)
-    extract = cropped(extract, window(*near, most))
-    streets_path = map_path.with_suffix(".streets.osm")
-    streets = write_streets(
-        extract,
-        streets_path,
-        window(*near, place.reach + STREET_REACH),
-        service=place.service,
-        left_hand=place.left_hand,
-    )
-    try:
-        if streets.streets == 0:
-            raise _no_street(extract, near, place.reach + STREET_REACH)
-        sources = yield from convert(streets, streets_path, map_path, sumo)
-    finally:
-        streets_path.unlink(missing_ok=True)
-    road_map = read_map(map_path)
-    shapes, middle = _shapes(extract, road_map, near)
-    surfaces = {road.id: lane_surfaces(road) for road in road_map.roads}
-    map_text = map_path.read_text(encoding="utf-8")
-    # A "junction" where one street only continues, with other lanes or width, is not a place to study, nor one where
-    # pedestrians are known to cross.
-    lanes = without_plain_joints(list(itertools.chain(*surfaces.values())))
-    meeting = {lane.junction_id for lane in lanes}
-    joints = {junction.name for junction in road_map.junctions if junction.id not in meeting}
-    road_map, map_text = with_mapped_crossings(road_map, map_text, surfaces, streets, shapes, joints)
-    junction = nearest_junctions(road_map, lanes, float(middle[0]), float(middle[1]), 1)
-    if (not junction or junction[0][1] > MAX_JUNCTION_DISTANCE) and place.radius is None:
-        raise SeipError(
-            f"no junction within {MAX_JUNCTION_DISTANCE:g} m of {near[0]:.5f}, {near[1]:.5f}: give a radius "
-            "for a place between junctions, or count service roads where driveways or aisles are streets too"
-        )
-    roundabouts = _roundabouts(road_map, streets, extract)
-    together = intersection(lanes, junction[0][0].id, roundabouts) if junction else frozenset[str]()
-    reach = place.reach if place.radius else max(place.reach, _reach(lanes, together, middle) + place.along)
-    carriageway = _carriageway(lanes, middle, reach)
-    area = shapely.Point(middle).buffer(reach + SCENE_MARGIN + STANDS_AROUND, quad_segs=16)
-    stands_there = surroundings(shapes, area, carriageway)
-    # Notes only concern the region of interest, not the streets that are laid out for traffic.
-    seen = shapely.Point(middle).buffer(place.radius or _reach(lanes, together, middle) + place.along)
-    tunnels = _tunnels(extract, shapes, seen, place.level)
-    _check_level(place.level, tunnels, road_map)
-    names = [_spelt(extract, name) for name in place.streets]
-    if not names:
-        title_place = replace(place, level=()) if tunnels else place
-        names = _title(road_map, lanes, title_place, middle, roundabouts, _ranks(streets.ways.values()))
-    is_junction = bool(junction) and junction[0][1] <= (place.radius or math.inf)
-    near_streets = [way for way in streets.ways.values() if seen.intersects(_path(shapes, way))]
+    _check(path, place)
+    extract, near, place_notes = yield from _extract_around(path, place)
+    source, network = yield from _network(extract, near, place, map_path, sumo)
+    shapes = PlanShapes(extract, _projection(network.streets.road_map), network.streets.road_map.header_offset[:2])
+    streets = with_mapped_crossings(network.streets, source, shapes)
+    extent = _extent(streets, source, extract, near, place)
+    stands_there = surroundings(shapes, extent.surroundings, extent.carriageway)
+    tunnels = _tunnels(extract, shapes, extent.seen, place.level)
+    _check_level(place.level, tunnels, streets.road_map)
+    near_streets = [way for way in source.ways.values() if extent.seen.intersects(_path(shapes, way))]
+    junction = extent.junction
     description = replace(
         stands_there,
-        name=STREETS.join(names) or f"{'Junction' if is_junction else 'Street'} at {near[0]:.5f}, {near[1]:.5f}",
-        near=None if place.radius is None else (float(middle[0]), float(middle[1])),
-        junction=junction[0][0].id if place.radius is None else None,
+        name=_name(extract, streets, source, place, extent, in_tunnel=bool(tunnels)),
+        near=None if place.radius is None else (float(extent.middle[0]), float(extent.middle[1])),
+        junction=junction.id if place.radius is None and junction is not None else None,
         radius=place.radius,
         approaches=place.approaches,
         from_centre_lines=True,
-        roundabouts=roundabouts,
+        roundabouts=extent.roundabouts,
         map_source=FROM_EXTRACT,
         widths_assumed=_assumed_widths(near_streets),
         attribution=(extract.attribution,),
     )
-    dropped = [counted(number, *reason) for reason, number in shapes.dropped.items() if number]
-    lone = [extract.nodes[number] for number in streets.lone_signals]
-    lone = [node for node in lone if seen.intersects(shapely.Point(shapes.point(node)))]
-    assumed = _assumed_lanes(near_streets)
-    return ExtractSite(
-        road_map,
-        map_text,
-        description,
-        (
-            *place_notes,
-            *extract.notes,
-            *streets.notes,
-            *assumed,
-            *_implausible_lanes(near_streets),
-            *_tunnel_notes(tunnels),
-            *_assumed_crossings(guessed_crossings(road_map, seen)),
-            *dropped,
-            *_lone_signals(lone),
-        ),
-        streets,
-        sources,
-        shapes,
-        surfaces,
-        seen,
+    lone = [extract.nodes[number] for number in source.lone_signals]
+    notes = (
+        *place_notes,
+        *extract.notes,
+        *source.notes,
+        *_assumed_lanes(near_streets),
+        *_lane_notes(near_streets, source.widened),
+        *_implausible_lanes(near_streets),
+        *_tunnel_notes(tunnels),
+        *_assumed_crossings(guessed_crossings(streets, extent.seen)),
+        *(counted(number, *reason) for reason, number in shapes.dropped.items() if number),
+        *_lone_signals([node for node in lone if extent.seen.intersects(shapely.Point(shapes.point(node)))]),
     )
+    return ExtractSite(streets, network, network.text, description, notes, source, shapes, extent.seen)
+
+
+def _extract_around(
+    path: Path, place: ExtractPlace
+) -> Generator[Progress, None, tuple[Extract, tuple[float, float], tuple[str, ...]]]:
+    """Return the part of an extract around a place, the latitude and longitude of the place, and notes on it."""
+    # Streets are laid out well beyond the region, for traffic; 200 m more hold the junction that was named, whose
+    # centre may lie away from the place.
+    most = place.reach + STREET_REACH + 200.0
+    extract = yield from read_extract(path, None if place.near is None else window(*place.near, most))
+    near, notes = (place.near, ()) if place.near else _meeting_place(extract, place.streets)
+    return cropped(extract, window(*near, most)), near, notes
+
+
+def _network(
+    extract: Extract, near: tuple[float, float], place: ExtractPlace, map_path: Path, sumo: Iterable[Path]
+) -> Generator[Progress, None, tuple[StreetFile, NetworkMap]]:
+    """Write the streets around a place, and return them with the network that netconvert makes of them."""
+    reach = place.reach + STREET_REACH
+    streets_path = map_path.with_name(f"{map_path.name}.streets.osm")
+    source = write_streets(
+        extract, streets_path, window(*near, reach), service=place.service, left_hand=place.left_hand
+    )
+    try:
+        if source.streets == 0:
+            raise _no_street(extract, near, reach)
+        yield from convert(source, streets_path, map_path, sumo)
+    finally:
+        streets_path.unlink(missing_ok=True)
+    return source, read_network_map(map_path)
+
+
+@dataclass(frozen=True, eq=False)
+class _Extent:
+    """What belongs to a place, in map coordinates.
+
+    Parameters
+    ----------
+    near : (latitude, longitude), degrees
+        Position of the place.
+    middle : (2,) float64, metres
+        The same in map coordinates.
+    junction : Junction or None
+        Nearest junction.
+    away : float, metres
+        Its distance.
+    roundabouts : tuple of frozenset of str
+        Junction ids of each roundabout.
+    seen : shapely geometry
+        Area about the region of interest, which notes refer to.
+    surroundings : shapely geometry
+        Area of the objects of the scene.
+    carriageway : shapely geometry
+        Carriageway within it.
+    """
+
+    near: tuple[float, float]
+    middle: Float
+    junction: Junction | None
+    away: float
+    roundabouts: tuple[frozenset[str], ...]
+    seen: BaseGeometry
+    surroundings: BaseGeometry
+    carriageway: BaseGeometry
+
+
+def _extent(
+    streets: StreetMap, source: StreetFile, extract: Extract, near: tuple[float, float], place: ExtractPlace
+) -> _Extent:
+    """Return what belongs to a place.
+
+    Raises
+    ------
+    SeipError
+        There is no junction near the place, and no radius is given.
+    """
+    road_map, lanes = streets.road_map, streets.lanes
+    middle = np.array(place_on_map(road_map, near))
+    found = nearest_junctions(road_map, lanes, float(middle[0]), float(middle[1]), 1)
+    junction, away = found[0] if found else (None, math.inf)
+    if away > MAX_JUNCTION_DISTANCE and place.radius is None:
+        raise SeipError(
+            f"no junction within {MAX_JUNCTION_DISTANCE:g} m of {near[0]:.5f}, {near[1]:.5f}: give a radius "
+            "for a place between junctions, or count service roads where driveways or aisles are streets too"
+        )
+    roundabouts = _roundabouts(road_map, source, extract)
+    together = frozenset[str]() if junction is None else intersection(lanes, junction.id, roundabouts)
+    size = _reach(lanes, together, middle) + place.along
+    reach = place.reach if place.radius else max(place.reach, size)
+    return _Extent(
+        near,
+        middle,
+        junction,
+        away,
+        roundabouts,
+        shapely.Point(middle).buffer(place.radius or size),
+        shapely.Point(middle).buffer(reach + SCENE_MARGIN + STANDS_AROUND, quad_segs=16),
+        _carriageway(streets, middle, reach),
+    )
+
+
+def _name(
+    extract: Extract,
+    streets: StreetMap,
+    source: StreetFile,
+    place: ExtractPlace,
+    extent: _Extent,
+    *,
+    in_tunnel: bool,
+) -> str:
+    """Return the title of a place: the streets that were asked for, or those that meet there."""
+    names = [_spelt(extract, name) for name in place.streets]
+    if not names:
+        titled = replace(place, level=()) if in_tunnel else place
+        ranks = _ranks(source.ways.values())
+        names = _title(streets.road_map, streets.lanes, titled, extent.middle, extent.roundabouts, ranks)
+    if names:
+        return STREETS.join(names)
+    latitude, longitude = extent.near
+    kind = "Junction" if extent.away <= (place.radius or math.inf) else "Street"
+    return f"{kind} at {latitude:.5f}, {longitude:.5f}"
 
 
 def _lone_signals(nodes: Sequence[Node]) -> Iterator[str]:
@@ -329,18 +385,36 @@ def _assumed_widths(ways: Iterable[Way]) -> frozenset[str]:
     return frozenset({"sidewalk", "biking"}) if known else frozenset({"sidewalk", "biking", "driving"})
 
 
+def _names(ways: Iterable[Way]) -> str:
+    """Return the names of streets for a note, in alphabetical order."""
+    unnamed = "streets without a name"
+    names = {{**way.tags, **shown_name(way.tags)}.get("name", unnamed) for way in ways}
+    known = sorted(names, key=lambda name: (name == unnamed, name))
+    return ", ".join(known[:MAX_NAMED]) + (f" and {len(known) - MAX_NAMED} more" * (len(known) > MAX_NAMED))
+
+
 def _assumed_lanes(ways: Iterable[Way]) -> Iterator[str]:
     """Yield notes on streets without a number of lanes in the extract."""
-    streets: dict[int, list[str]] = {}
+    streets: dict[int, list[Way]] = {}
     for way in ways:
         if "highway" in way.tags and not has_lane_count(way.tags) and not implausible_lanes(way.tags):
-            name = {**way.tags, **shown_name(way.tags)}.get("name", "streets without a name")
-            streets.setdefault(usual_lanes(way.tags), []).append(name)
-    for lanes, names in sorted(streets.items()):
-        known = list(dict.fromkeys(sorted(names, key=lambda name: (name == "streets without a name", name))))
-        listed = ", ".join(known[:MAX_NAMED]) + (f" and {len(known) - MAX_NAMED} more" * (len(known) > MAX_NAMED))
+            streets.setdefault(usual_lanes(way.tags), []).append(way)
+    for lanes, found in sorted(streets.items()):
         each = "one lane is" if lanes == 1 else f"{lanes} lanes are"
-        yield f"{each} assumed in each direction of streets without a number of lanes in the extract: {listed}"
+        yield f"{each} assumed in each direction of streets without a number of lanes in the extract: {_names(found)}"
+
+
+def _lane_notes(ways: Sequence[Way], widened: Collection[Way]) -> Iterator[str]:
+    """Yield notes on pieces with the lanes of their neighbours, and on streets with one lane for both directions."""
+    pieces = [way for way in ways if way in widened]
+    shared = [way for way in ways if "highway" in way.tags and shares_lane(way.tags)]
+    if pieces:
+        yield (
+            f"pieces shorter than {SHORT_PIECE:g} m without a number of lanes have those of their neighbours: "
+            f"{_names(pieces)}"
+        )
+    if shared:
+        yield f"one lane serves both directions of {_names(shared)}, as the extract gives one lane in all"
 
 
 def _implausible_lanes(ways: Iterable[Way]) -> Iterator[str]:
@@ -399,7 +473,10 @@ def _assumed_crossings(number: int) -> Iterator[str]:
         yield f"{are} assumed: the extract maps none there"
 
 
-def _check(place: ExtractPlace) -> None:
+def _check(path: Path, place: ExtractPlace) -> None:
+    """Raise an error if a place is not given, or not validly."""
+    if place.near is None and not place.streets:
+        raise SeipError(f'{path.name} needs a place: --near-latlon LAT LON, or --junction "One Street" "Other Street"')
     for name, length in (("radius", place.radius), ("approaches", place.approaches)):
         if length is not None and not 0.0 < length < math.inf:
             raise SeipError(f"--{name} {length:g} is not a valid length: give metres above zero")
@@ -437,9 +514,9 @@ def surroundings_of_map(
     """
     extract = yield from read_extract(path)
     shapes = PlanShapes(extract, _projection(road_map), road_map.header_offset[:2])
-    lanes = [lane for road in road_map.roads for lane in lane_surfaces(road)]
+    streets = StreetMap(road_map, tuple(lane for road in road_map.roads for lane in lane_surfaces(road)))
     area = shapely.Point(middle).buffer(reach + SCENE_MARGIN + STANDS_AROUND, quad_segs=16)
-    found = surroundings(shapes, area, _carriageway(lanes, middle, reach))
+    found = surroundings(shapes, area, _carriageway(streets, middle, reach))
     if not found.has_objects:
         raise SeipError(f"{path.name} has no objects at the place: use an extract of the area of the map")
     dropped = [counted(number, *reason) for reason, number in shapes.dropped.items() if number]
@@ -469,16 +546,11 @@ def _projection(road_map: RoadMap) -> TransverseMercator:
     return to_map
 
 
-def _shapes(extract: Extract, road_map: RoadMap, near: tuple[float, float]) -> tuple[PlanShapes, Float]:
-    """Return the shapes of an extract in map coordinates, and the position of the place there, (2,) metres."""
-    shapes = PlanShapes(extract, _projection(road_map), road_map.header_offset[:2])
-    return shapes, np.array(place_on_map(road_map, near))
-
-
-def _carriageway(lanes: Sequence[LaneSurface], middle: Float, reach: float) -> BaseGeometry:
+def _carriageway(streets: StreetMap, middle: Float, reach: float) -> BaseGeometry:
     near = shapely.Point(middle).buffer(reach + SCENE_MARGIN + STANDS_AROUND)
-    driving = road_surface.in_groups(lanes, ["driving"])
-    return shapely.union_all([shapely.make_valid(lane.polygon) for lane in driving if road_surface.is_near(lane, near)])
+    driving = [lane for lane in road_surface.in_groups(streets.lanes, ["driving"]) if road_surface.is_near(lane, near)]
+    junctions = [one.carriageway for one in streets.junctions if one.carriageway.intersects(near)]
+    return road_surface.without_crumbs(united([road_surface.lane_outline(driving), *junctions]))
 
 
 def _roundabouts(road_map: RoadMap, streets: StreetFile, extract: Extract) -> tuple[frozenset[str], ...]:

@@ -12,6 +12,7 @@ from ...site.post_rules import RuleName
 from ...site.scene_geometry import ASSUMED, FROM_EXTRACT
 from ..streetscape.description import Poles, SideWay, SiteDescription, Slab, Trees, Wall
 from ..streetscape.map_furniture import CROWN_SHARE, LIGHT_ARM, LIGHT_HEIGHT, TREE_HEIGHT
+from .bridges import layer
 from .buildings import buildings, passages
 from .extract import Node, Tags
 from .keep_off import keep_off_areas
@@ -78,7 +79,7 @@ def surroundings(shapes: PlanShapes, area: BaseGeometry, carriageway: BaseGeomet
     ]
     walls, ways = tuple(_barriers(shapes, area)), tuple(_side_ways(shapes, area))
     return SiteDescription(
-        buildings=tuple(buildings(shapes, area, passages(shapes, carriageway))),
+        buildings=tuple(buildings(shapes, area, passages(shapes, carriageway, list(_passages(shapes, area))))),
         trees=(*_single_trees(nodes), *_tree_rows(shapes, area)),
         walls=walls,
         street_lights=tuple(_lamps(nodes)),
@@ -224,16 +225,28 @@ def _back_wall(outline: shapely.Polygon, carriageway: BaseGeometry) -> shapely.P
 def _side_ways(shapes: PlanShapes, area: BaseGeometry) -> Iterator[SideWay]:
     for way, line in shapes.lines(area, "highway", set(WAY_WIDTHS)):
         tags = way.tags
-        if tags.get("tunnel", "no") != "no" or tags.get("indoor", "no") != "no":
+        if tags.get("tunnel", "no") not in ("no", "building_passage") or tags.get("indoor", "no") != "no":
             continue
-        if tags.get("layer", "0") != "0" or tags.get("bridge", "no") != "no" or tags.get("footway") == "crossing":
+        if layer(tags) != 0 or tags.get("footway") == "crossing":
             continue
-        usual, material, name, rule = WAY_WIDTHS[tags["highway"]]
+        _, material, name, rule = WAY_WIDTHS[tags["highway"]]
         if tags.get("area") == "yes":
             outline = shapes.footprint(way)
             if outline is not None:
                 yield SideWay(outline, material, name, rule)
             continue
-        width = metres(tags.get("width"), MAX_BARRIER) or usual
-        along = line if name == FOOTWAYS else None
+        width = _way_width(tags)
+        along = line if "sidewalk" in (tags.get("footway"), tags.get("path")) else None
         yield SideWay(shapely.LineString(line).buffer(width / 2), material, name, rule, along, width)
+
+
+def _way_width(tags: Tags) -> float:
+    """Return the width of a way that is not a road, metres."""
+    return metres(tags.get("width"), MAX_BARRIER) or WAY_WIDTHS[tags["highway"]][0]
+
+
+def _passages(shapes: PlanShapes, area: BaseGeometry) -> Iterator[BaseGeometry]:
+    """Yield the areas of ways that are not roads where they lead through buildings."""
+    for way, line in shapes.lines(area, "highway", set(WAY_WIDTHS)):
+        if way.tags.get("tunnel") == "building_passage":
+            yield shapely.LineString(line).buffer(_way_width(way.tags) / 2, cap_style="square")

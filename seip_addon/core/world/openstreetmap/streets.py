@@ -4,7 +4,7 @@ import itertools
 import math
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
@@ -13,10 +13,22 @@ import shapely
 
 from ...arrays import Float
 from .bridges import Structures, structures
-from .extract import Extract, Node, Tags, Way
+from .extract import Extract, Node, Tags, Way, reversed_tags
 from .handedness import drives_on_the_left
-from .quantities import count, metres
 from .signals import Signals, matched_signals
+from .street_lanes import (
+    CYCLE_LANE_WIDTH,
+    DIRECTIONS,
+    SIDEWALK_WIDTH,
+    cycle_lane,
+    has_contraflow,
+    has_lane_count,
+    implausible_lanes,
+    is_one_way,
+    is_roundabout,
+    lane_counts,
+    lane_widths,
+)
 
 CLASSES = (
     *("motorway", "trunk", "primary", "secondary", "tertiary"),
@@ -29,23 +41,16 @@ TRACKS = {"tram", "light_rail"}
 """Values of ``railway`` whose tracks may lie in a street."""
 PAVED_CLASSES = {"primary", "secondary", "tertiary", "unclassified", "residential", "living_street", "road"}
 """Classes of streets that have a pavement on both sides unless the map has tags for pavements."""
-WIDE_CLASSES = {"motorway", "trunk"}
-"""Streets whose one-way carriageways usually have two lanes."""
-ONE_WAY = {"yes", "true", "1", "-1", "reverse"}
 COPIED = (
     *("highway", "railway", "name", "oneway", "junction", "maxspeed"),
     *("turn:lanes", "turn:lanes:forward", "turn:lanes:backward", "access", "area"),
 )
 """Tags of a street that netconvert reads as they are."""
-MAX_LANES, MAX_STREET_WIDTH = 12, 60.0
-LANE_WIDTHS = (2.25, 6.0)
-"""Narrowest and widest lane (metres); lane widths from tags are clamped to this range."""
-CYCLE_LANES = {"lane", "track", "opposite_lane", "opposite_track", "shared_busway"}
-CYCLE_LANE_WIDTH, SIDEWALK_WIDTH = 1.5, 2.5  # metres
 _SIDES = {(True, True): "both", (True, False): "left", (False, True): "right", (False, False): "none"}
 _FIRST_OTHER = "\u0900"  # from here on (Devanagari, Thai, Chinese …) the font of the pictures has no letters
 MAX_MEDIAN = 35.0  # metres between the middles of two carriageways of one street
 JOIN_DISTANCE = 20.0  # metres between nodes that are one junction
+SHORT_PIECE = 30.0  # metres: a piece of a street that is shorter is no longer than a junction
 MIN_ELEVATED = 0.8  # share of a street network's nodes that must have an elevation for it to be used
 
 
@@ -71,6 +76,8 @@ class StreetFile:
         Streets on bridges and in underpasses.
     lone_signals : tuple of int
         Nodes of traffic signals without a junction within reach.
+    widened : tuple of Way
+        Short pieces of streets that have the lanes of their neighbours.
     notes : tuple of str
         Assumptions made, as messages.
     """
@@ -83,6 +90,7 @@ class StreetFile:
     ways: Mapping[int, Way]
     structures: Structures
     lone_signals: tuple[int, ...]
+    widened: tuple[Way, ...]
     notes: tuple[str, ...]
 
 
@@ -134,7 +142,9 @@ def write_streets(
     left_hand : bool, optional
         Whether traffic keeps to the left; by default derived from the extract and its location.
     """
+    mapped, extract = extract, _with_lanes_of_neighbours(extract, service=service)
     pieces = list(_pieces(extract, window, service=service))
+    widened = tuple(way for number, way in pieces if number in mapped.ways and mapped.ways[number].tags is not way.tags)
     used = list(dict.fromkeys(number for _, way in pieces for number in way.nodes))
     notes: list[str] = []
     if left_hand is None:
@@ -159,8 +169,100 @@ def write_streets(
     slip_ends = tuple(_slip_ends(extract, [way for _, way in pieces]))
     crossed = structures(extract, pieces, places)
     return StreetFile(
-        len(pieces), elevated, left_hand, roundabouts, slip_ends, dict(pieces), crossed, signals.unmatched, tuple(notes)
+        len(pieces),
+        elevated,
+        left_hand,
+        roundabouts,
+        slip_ends,
+        dict(pieces),
+        crossed,
+        signals.unmatched,
+        widened,
+        tuple(notes),
     )
+
+
+def _with_lanes_of_neighbours(extract: Extract, *, service: bool) -> Extract:
+    """Return the extract with lanes for short pieces of streets that have no number of lanes between pieces that do.
+
+    Such a piece would narrow the street to one lane in each direction for the length of a junction.
+    """
+    streets = {
+        number: way
+        for number, way in extract.ways.items()
+        if "highway" in way.tags and is_street(way.tags, service=service) and len(way.nodes) > 1
+    }
+    at: dict[int, list[int]] = {}
+    for number, way in streets.items():
+        for end in {way.nodes[0], way.nodes[-1]}:
+            at.setdefault(end, []).append(number)
+
+    def onward(number: int, end: int) -> list[int]:
+        way = streets[number]
+        return [other for other in at[end] if other != number and _continues(way, streets[other], end)]
+
+    ends = {
+        number: [onward(number, end) for end in (way.nodes[0], way.nodes[-1])]
+        for number, way in streets.items()
+        if not has_lane_count(way.tags) and not implausible_lanes(way.tags) and _is_short(extract, way)
+    }
+    # A chain of short pieces counts if both of its ends lead on to pieces with lanes.
+    left: set[int] | None = None
+    while left is None or left:
+        left = {
+            number
+            for number, around in ends.items()
+            if not all(any(one in ends or has_lane_count(streets[one].tags) for one in side) for side in around)
+        }
+        ends = {number: around for number, around in ends.items() if number not in left}
+    while ends:
+        given = {
+            number: [
+                _lanes_along(streets[number], streets[other])
+                for other in itertools.chain(*around)
+                if has_lane_count(streets[other].tags)
+            ]
+            for number, around in ends.items()
+        }
+        # The wider neighbour: a lane too many is a taper, and one too few is a post in a lane.
+        for number, options in given.items():
+            if options:
+                widest = max(options, key=lambda tags: sum(lane_counts(tags).values()))
+                streets[number] = replace(streets[number], tags={**widest, **streets[number].tags})
+                del ends[number]
+        if not any(given.values()):
+            break
+    return replace(extract, ways={**extract.ways, **streets})
+
+
+def _is_short(extract: Extract, way: Way) -> bool:
+    """Return whether a way is no longer than `SHORT_PIECE`; False if the extract lacks one of its nodes."""
+    line = _in_metres(extract, extract.line(way))
+    return len(line) == len(way.nodes) and float(np.hypot(*np.diff(line, axis=0).T).sum()) <= SHORT_PIECE
+
+
+def _is_against(way: Way, other: Way) -> bool:
+    """Return whether two ways with a common end are drawn towards each other, or away from each other."""
+    return way.nodes[0] == other.nodes[0] or way.nodes[-1] == other.nodes[-1]
+
+
+def _continues(way: Way, other: Way, end: int) -> bool:
+    """Return whether a street continues another one, which ends at a node, in driving direction."""
+    one_way = is_one_way(way.tags)
+    against = (way.nodes[0] == end) == (other.nodes[0] == end)
+    return (
+        way.tags.get("name") == other.tags.get("name")
+        and one_way == is_one_way(other.tags)
+        and not (one_way and against)
+    )
+
+
+def _lanes_along(way: Way, other: Way) -> Tags:
+    """Return the tags for lanes of a street that continues a way, seen along that way."""
+    tags = reversed_tags(other.tags) if _is_against(way, other) else dict(other.tags)
+    kept = {key: value for key, value in tags.items() if key.partition(":")[0] in ("lanes", "width", "placement")}
+    counts = {f"lanes:{direction}": str(number) for direction, number in lane_counts(tags).items()}
+    return kept if "lanes" in kept else kept | counts
 
 
 def _slip_ends(extract: Extract, ways: Sequence[Way]) -> Iterator[int]:
@@ -292,126 +394,35 @@ def _tags(way: Way, medians: "_Medians", *, left_hand: bool) -> dict[str, str]:
     tags = {key: given[key] for key in COPIED if key in given} | shown_name(given)
     if given.get("railway") in TRACKS and "highway" not in given:
         return tags
-    tags |= _lane_tags(given)
+    if given.get("highway") == "road":  # a street of unknown class, which netconvert does not have
+        tags["highway"] = "unclassified"
+    lanes, widths = lane_counts(given), lane_widths(given)
+    if not is_one_way(given) or lanes.get("backward", 0) > 1:
+        tags |= {"lanes": str(sum(lanes.values())), "oneway": "no"}
+        tags |= {f"lanes:{direction}": str(number) for direction, number in lanes.items()}
+    else:
+        tags |= {"lanes": str(lanes["forward"])} | ({"busway": "opposite_lane"} if has_contraflow(given) else {})
+    cycle = {direction: cycle_lane(given, direction, left_hand=left_hand) for direction in DIRECTIONS}
+    left, right = _sidewalks(way, medians, left_hand=left_hand)
+    paved = dict(zip(DIRECTIONS, (left, right) if left_hand else (right, left), strict=True))
     # In the written tags ``right`` always is the side where traffic keeps, as in a right-hand network: for left-hand
     # traffic both sides are exchanged.
-    near, far = ("left", "right") if left_hand else ("right", "left")
-    cycle = {"right": _cycle_lane(given, near), "left": _cycle_lane(given, far)}
-    walked = dict(zip(("left", "right"), _sidewalks(way, medians, left_hand=left_hand), strict=True))
-    paved = {"right": walked[near], "left": walked[far]}
-    tags |= {f"cycleway:{side}": kind for side, kind in cycle.items() if kind is not None}
-    tags["sidewalk"] = _SIDES[paved["left"], paved["right"]]
-    outer = {
-        side: [CYCLE_LANE_WIDTH] * (cycle[side] is not None) + [SIDEWALK_WIDTH] * paved[side]
-        for side in ("right", "left")
+    tags |= {
+        f"cycleway:{side}": kind
+        for side, kind in zip(("right", "left"), cycle.values(), strict=True)
+        if kind is not None
     }
-    return tags | _widths(given, outer)
-
-
-def _lane_tags(tags: Tags) -> dict[str, str]:
-    """Return the tags for the number of lanes; without them netconvert uses other defaults by class of street."""
-    lanes = lane_counts(tags)
-    own = {} if is_one_way(tags) else {f"lanes:{way}": str(number) for way, number in lanes.items()}
-    return {"lanes": str(sum(lanes.values()))} | own
-
-
-def _cycle_lane(tags: Tags, side: str) -> str | None:
-    kind = tags.get(f"cycleway:{side}", tags.get("cycleway:both", tags.get("cycleway", "no")))
-    if kind not in CYCLE_LANES or kind == "shared_busway":
-        return None
-    return "track" if "track" in kind else "lane"
-
-
-def _widths(tags: Tags, outer: Mapping[str, list[float]]) -> dict[str, str]:
-    """Return the tags for the widths of all lanes, left to right in driving direction; none if the map has no width.
-
-    Parameters
-    ----------
-    outer : dict
-        Widths (metres) of existing cycle lanes and pavements on the ``right`` and ``left``; traffic keeps to the right.
-    """
-    lanes = lane_counts(tags)
-    widths = {way: _lane_widths(tags, way, number) for way, number in lanes.items()}
-    if not any(widths.values()):
-        return {}
-    # A list has one entry for each lane that netconvert makes: driving lanes first, then cycle lane and pavement, which
-    # lie to the right of the lanes of their direction. Seen along the way, those of the backward direction are left.
-    named = {"forward": "" if is_one_way(tags) else ":forward", "backward": ":backward"}
-    side = {"forward": "right", "backward": "left"}
-    return {
-        f"width:lanes{named[way]}": "|".join(f"{one:.2f}" for one in [*each, *outer[side[way]]])
-        for way, each in widths.items()
-        if each
-    }
-
-
-def lane_counts(tags: Tags) -> dict[str, int]:
-    """Return the number of lanes of a street in each direction: ``forward`` and, for two-way streets, ``backward``.
-
-    A direction without a number has `usual_lanes`. A two-way street with a single lane for both directions is laid out
-    with one lane for each.
-    """
-    whole = int(count(tags.get("lanes"), MAX_LANES) or 0)
-    if is_one_way(tags):
-        return {"forward": whole or _listed_lanes(tags, "") or usual_lanes(tags)}
-    own = {
-        way: int(count(tags.get(f"lanes:{way}"), MAX_LANES) or 0) or _listed_lanes(tags, f":{way}")
-        for way in ("forward", "backward")
-    }
-    # ``lanes`` counts both directions. Where it contradicts the numbers by direction, or leaves a direction without a
-    # lane, the larger total holds. An odd lane, and any lanes that no direction has, go to the forward direction.
-    total = max(whole, sum(number or 1 for number in own.values()))
-    backward = own["backward"] or (total - own["forward"] if own["forward"] else total // 2)
-    return {"forward": total - backward, "backward": backward}
-
-
-def usual_lanes(tags: Tags) -> int:
-    """Return the assumed number of lanes in each direction of a street without a number of lanes in the map."""
-    return 2 if is_one_way(tags) and tags.get("highway") in WIDE_CLASSES else 1
-
-
-def has_lane_count(tags: Tags) -> bool:
-    """Return whether the map gives the number of lanes of a street."""
-    ways = ("",) if is_one_way(tags) else (":forward", ":backward")
-    whole = count(tags.get("lanes"), MAX_LANES) or 0
-    return whole >= 1 or all(
-        (count(tags.get(f"lanes{way}"), MAX_LANES) or 0) >= 1 or _listed_lanes(tags, way) > 0 for way in ways
-    )
-
-
-def implausible_lanes(tags: Tags) -> dict[str, str]:
-    """Return the tags for a street's number of lanes whose values are not plausible."""
-    keys = ("lanes", "lanes:forward", "lanes:backward")
-    return {key: tags[key] for key in keys if key in tags and (count(tags[key], MAX_LANES) or 0.0) <= 0.0}
-
-
-def has_widths(tags: Tags) -> bool:
-    """Return whether the map gives the width of a street's lanes."""
-    return all(_lane_widths(tags, way, number) for way, number in lane_counts(tags).items())
-
-
-def _listed_lanes(tags: Tags, way: str) -> int:
-    """Return the number of lanes in the ``turn:lanes`` list of a direction, 0 without a list."""
-    listed = tags.get(f"turn:lanes{way}", "")
-    number = listed.count("|") + 1
-    return number if listed and number <= MAX_LANES else 0
-
-
-def _lane_widths(tags: Tags, way: str, lanes: int) -> list[float]:
-    """Return the widths of the driving lanes of one direction, metres; an empty list if the map has none."""
-    low, high = LANE_WIDTHS
-    key = "width:lanes" if is_one_way(tags) else f"width:lanes:{way}"
-    # A list for each lane counts only if it fits the number of lanes. Otherwise the width of the whole carriageway is
-    # shared equally between the lanes of both directions, less the cycle lanes marked on it.
-    given = [metres(one, MAX_STREET_WIDTH) for one in tags.get(key, "").split("|")]
-    if len(given) == lanes and all(given):
-        return [min(max(one, low), high) for one in given if one]
-    width = metres(tags.get("width", tags.get("width:carriageway")), MAX_STREET_WIDTH)
-    if width is None:
-        return []
-    cycle_lanes = sum(_cycle_lane(tags, side) is not None for side in ("left", "right"))
-    each = (width - cycle_lanes * CYCLE_LANE_WIDTH) / sum(lane_counts(tags).values())
-    return [min(max(each, low), high)] * lanes
+    tags["sidewalk"] = _SIDES[paved["backward"], paved["forward"]]
+    # A list of widths has one entry for each lane that netconvert makes, left to right in driving direction: the outer
+    # lanes, cycle lane and pavement, are last in right-hand and first in left-hand traffic. Without a list, a pavement
+    # that lies against the direction of a one-way street would be as wide as a lane.
+    for direction in DIRECTIONS:
+        outer = [CYCLE_LANE_WIDTH] * (cycle[direction] is not None) + [SIDEWALK_WIDTH] * paved[direction]
+        each = [*(outer[::-1] if left_hand else ()), *widths.get(direction, ()), *(() if left_hand else outer)]
+        key = "width:lanes" if direction == "forward" and tags.get("oneway") != "no" else f"width:lanes:{direction}"
+        if each:
+            tags[key] = "|".join(f"{one:.2f}" for one in each)
+    return tags
 
 
 def shown_name(tags: Tags) -> dict[str, str]:
@@ -424,12 +435,6 @@ def shown_name(tags: Tags) -> dict[str, str]:
     if not name:
         return {"name": tags["ref"]} if tags.get("ref") else {}
     return {"name": english} if english and any(character >= _FIRST_OTHER for character in name) else {}
-
-
-def is_one_way(tags: Tags) -> bool:
-    """Return whether traffic goes along a street in one direction only."""
-    motorway = tags.get("highway", "").startswith("motorway")
-    return tags.get("oneway", "yes" if motorway or is_roundabout(tags) else "no") in ONE_WAY
 
 
 def _sidewalks(way: Way, medians: "_Medians", *, left_hand: bool) -> tuple[bool, bool]:
@@ -490,31 +495,26 @@ class _Medians:
         steps = np.diff(line, axis=0)
         if not len(steps):
             return False, False
-        # Cast a ray to each side from the middle of the longest segment, away from junctions at the ends. It starts at
-        # 2 m, so as not to meet the street itself.
-        longest = int(np.argmax(np.hypot(*steps.T)))
-        middle, along = (line[longest] + line[longest + 1]) / 2, steps[longest] / (np.hypot(*steps[longest]) or 1.0)
-        aside = np.array([-along[1], along[0]])
+        # Cast a ray to each side from the middle of each segment: where carriageways part around a refuge, they are
+        # parallel for a few metres only. It starts at 2 m, so as not to meet the street itself.
         found = [False, False]
-        for side, sign in enumerate((1.0, -1.0)):
-            ray = shapely.linestrings(np.stack([middle + 2.0 * sign * aside, middle + MAX_MEDIAN * sign * aside]))
-            for index in self._tree.query(ray, predicate="intersects"):
-                # The other carriageway has the same name and leads the opposite way, within 37 degrees (cosine below
-                # -0.8). A parallel one-way street of the same direction does not make the space between them a median.
-                ahead = self._stop[index] - self._start[index]
-                opposite = float(ahead @ along) < -0.8 * float(np.hypot(*ahead))
-                found[side] |= opposite and self._names[index] == way.tags.get("name", "")
+        for start, step in zip(line, steps, strict=False):
+            middle, along = start + step / 2, step / (np.hypot(*step) or 1.0)
+            aside = np.array([-along[1], along[0]])
+            for side, sign in enumerate((1.0, -1.0)):
+                ray = shapely.linestrings(np.stack([middle + 2.0 * sign * aside, middle + MAX_MEDIAN * sign * aside]))
+                for index in self._tree.query(ray, predicate="intersects"):
+                    # The other carriageway has the same name and leads the opposite way, within 37 degrees (cosine
+                    # below -0.8). A parallel one-way street of the same direction does not make the space between them
+                    # a median.
+                    ahead = self._stop[index] - self._start[index]
+                    opposite = float(ahead @ along) < -0.8 * float(np.hypot(*ahead))
+                    found[side] |= opposite and self._names[index] == way.tags.get("name", "")
         return found[0], found[1]
 
     def _line(self, way: Way) -> Float:
         """Return the line of a way (n, 2), metres from the extract's first node, in driving direction."""
-        line = _in_metres(self._extract, self._extract.line(way))
-        return line[::-1] if way.tags.get("oneway") in ("-1", "reverse") else line
-
-
-def is_roundabout(tags: Tags) -> bool:
-    """Return whether a way is part of a roundabout."""
-    return tags.get("junction") in ("roundabout", "circular")
+        return _in_metres(self._extract, self._extract.line(way))
 
 
 def _is_link(tags: Tags) -> bool:

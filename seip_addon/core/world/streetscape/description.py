@@ -189,9 +189,9 @@ class SideWay:
     keep_off : str or None
         Rule that excludes new posts from it.
     line : (n, 2) float64, metres, or None
-        Centre line of a footway, which may duplicate a pavement of the street; None for other ways.
+        Centre line of a sidewalk, which is the pavement of the street along it; None for other ways.
     width : float, metres
-        Width of the footway along that line.
+        Width of the sidewalk along that line.
     """
 
     area: BaseGeometry

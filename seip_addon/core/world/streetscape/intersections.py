@@ -6,83 +6,24 @@ wide streets cross.
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
 
 import numpy as np
 import shapely
 from shapely.affinity import rotate
 from shapely.geometry.base import BaseGeometry
 
-from ...arrays import Float
 from ...geometry.plan import closed, united
 from ..opendrive.junctions import junction_area
 from ..opendrive.lanes import LaneSurface
 from ..opendrive.road_map import Road
 
-FOOTPATHS = {"sidewalk", "walking", "none"}
-MIN_ARMS = 3  # arms of a junction; where fewer meet, a street continues
-ARM_GAP = 2.0  # metres between two ends of roads of one arm at most
 SAME_DIRECTION = math.radians(40.0)  # roads whose ends differ by less lead the same way
 TOUCH = 0.5  # metres between a junction and the end of a road that meets it at most
+JOINT = 1.0  # metres: gaps up to twice this between the lanes of a ring are closed
 JUNCTION_REACH = 20.0  # metres between two junctions of one intersection at most
 PARALLEL = math.radians(15.0)  # largest angle between the carriageways of a street
 MAX_MEDIAN = 22.0  # metres between the middles of lanes of two carriageways of one street at most
 MAX_INTERSECTION = 45.0  # metres from the junction in the middle to the farthest of an intersection at most
-
-
-def without_plain_joints(surfaces: Sequence[LaneSurface]) -> tuple[LaneSurface, ...]:
-    """Return the lanes with `junction_id` removed from those in junctions where no more than two arms meet.
-
-    Pavements that are separate roads are not arms; netconvert makes one on the left of a one-way street.
-    """
-    areas = _areas(surfaces)
-    # The ends of all lanes of streets outside junctions, as lines across the lane, with the direction along the road
-    # from that end. Only driving lanes count as ends of two-way streets.
-    streets = {lane.road_id for lane in surfaces if lane.lane_type not in FOOTPATHS}
-    ends, outwards, roads = [], [], []
-    for lane in surfaces:
-        if lane.junction_id is None and lane.road_id in streets:
-            for row, next_row in ((0, 1), (-1, -2)):
-                roads.append((lane.road_id if lane.lane_type == "driving" else None, row))
-                ends.append(shapely.LineString([lane.left[row, :2], lane.right[row, :2]]))
-                outwards.append(lane.left[next_row, :2] - lane.left[row, :2])
-    tree = shapely.STRtree(ends)
-    joints = set()
-    for number, area in areas.items():
-        # Ends within `ARM_GAP` of each other merge into one part of the union: these are lanes of one arm.
-        touching = tree.query(area, predicate="dwithin", distance=TOUCH)
-        arms = shapely.union_all([ends[index].buffer(ARM_GAP / 2) for index in touching])
-        # Each of three counts may miss an arm: ends of different arms may lie close together, arms may lead in similar
-        # directions, and ends in a row may belong to several streets. A junction is a plain joint only if all three
-        # find fewer than three arms.
-        meeting = (
-            len(shapely.get_parts(arms)),
-            _directions([outwards[index] for index in touching]),
-            _two_way_streets({roads[index] for index in touching}),
-        )
-        if max(meeting) < MIN_ARMS:
-            joints.add(number)
-    # Lanes of a plain joint become part of the street: they only lose the id of the junction.
-    return tuple(replace(lane, junction_id=None) if lane.junction_id in joints else lane for lane in surfaces)
-
-
-def _two_way_streets(ends: Iterable[tuple[str | None, int]]) -> int:
-    """Return the largest number of two-way streets whose one-way carriageways end at one point."""
-    # A two-way street has one road that starts here (row 0) and one that ends here (row -1).
-    rows = [row for road, row in ends if road is not None]
-    return min(rows.count(0), rows.count(-1))
-
-
-def _directions(vectors: Sequence[Float]) -> int:
-    """Return the number of directions of vectors (2,) that differ by more than `SAME_DIRECTION` from each other."""
-    # A heading opens a new direction if it differs from all found so far. It is compared modulo a full turn, because
-    # both ends of a street that passes through are separate arms.
-    found: list[float] = []
-    for x, y in vectors:
-        heading = math.atan2(y, x)
-        if (x or y) and all(abs(math.remainder(heading - other, math.tau)) > SAME_DIRECTION for other in found):
-            found.append(heading)
-    return len(found)
 
 
 def intersection(
@@ -126,20 +67,20 @@ def intersection(
 
 
 def ring_roads(
-    roads: Iterable[Road], junctions: frozenset[str], roundabouts: Iterable[frozenset[str]]
+    roads: Iterable[Road], roundabouts: Iterable[frozenset[str]], junctions: frozenset[str] | None = None
 ) -> frozenset[str]:
-    """Return the ids of the roads that form the rings of the roundabouts of an intersection.
+    """Return the ids of the roads that form the rings of roundabouts.
 
     Parameters
     ----------
     roads : iterable of Road
         Roads of the map.
-    junctions : frozenset of str
-        Ids of the junctions of the intersection.
     roundabouts : iterable of frozenset of str
         Junction ids of each roundabout.
+    junctions : frozenset of str, optional
+        Junctions of an intersection; roundabouts without any of these do not count.
     """
-    rings = [one for one in roundabouts if one & junctions]
+    rings = [one for one in roundabouts if junctions is None or one & junctions]
 
     def in_ring(road: Road, ring: frozenset[str]) -> bool:
         # Part of the ring: within one of its junctions, or between two of them.
@@ -147,6 +88,16 @@ def ring_roads(
         return road.junction_id in ring or all(end is not None and end.id in ring for end in ends)
 
     return frozenset(road.id for road in roads if any(in_ring(road, ring) for ring in rings))
+
+
+def enclosed(ring: Iterable[BaseGeometry]) -> BaseGeometry:
+    """Return what the areas of the lanes of a ring enclose."""
+    area = closed(united(ring), JOINT)
+    return united(shapely.Polygon(hole) for part in _polygons(area) for hole in part.interiors)
+
+
+def _polygons(area: BaseGeometry) -> list[shapely.Polygon]:
+    return [part for part in shapely.get_parts(area) if part.geom_type == "Polygon"]
 
 
 def with_other_carriageways(
@@ -200,7 +151,7 @@ def with_other_carriageways(
         for lane in surfaces
         if names.get(lane.road_id) not in bands
         and not (names.get(lane.road_id) and _runs_along(lane, headings))
-        and _leads_between(lane, streets)
+        and leads_between(lane, streets)
     ]
     return united([streets, united(links).intersection(united(sides.values()))])
 
@@ -239,7 +190,7 @@ def box_along(area: BaseGeometry, lanes: Iterable[LaneSurface]) -> BaseGeometry:
     meeting = [
         lane
         for lane in lanes
-        if lane.junction_id is None and lane.polygon.distance(area) < TOUCH and not _leads_between(lane, area)
+        if lane.junction_id is None and lane.polygon.distance(area) < TOUCH and not leads_between(lane, area)
     ]
     # Turn the area so that a road lies along x, take its bounding box and turn that back. The rectangle of least area
     # overall would lie askew to all roads where the area is irregular.
@@ -250,7 +201,7 @@ def box_along(area: BaseGeometry, lanes: Iterable[LaneSurface]) -> BaseGeometry:
     return min(boxes, key=lambda box: float(box.area), default=shapely.minimum_rotated_rectangle(area))
 
 
-def _leads_between(lane: LaneSurface, area: BaseGeometry) -> bool:
+def leads_between(lane: LaneSurface, area: BaseGeometry) -> bool:
     """Return whether a lane begins and ends at an area."""
     ends = [shapely.Point((lane.left[row, :2] + lane.right[row, :2]) / 2) for row in (0, -1)]
     return all(area.distance(end) < TOUCH for end in ends)
@@ -260,16 +211,6 @@ def _heading(lane: LaneSurface) -> float:
     """Return the direction from the start of a lane to its end, radians."""
     x, y = (lane.left[-1] + lane.right[-1] - lane.left[0] - lane.right[0])[:2].tolist()
     return math.atan2(y, x)
-
-
-def filled(surfaces: Iterable[LaneSurface]) -> BaseGeometry:
-    """Return the area of a junction's lanes, with holes between them and narrow gaps at the edge filled."""
-    area = closed(united(lane.polygon for lane in surfaces), 0.5)
-    return united(shapely.Polygon(part.exterior) for part in _polygons(area))
-
-
-def _polygons(area: BaseGeometry) -> list[shapely.Polygon]:
-    return [part for part in shapely.get_parts(area) if part.geom_type == "Polygon"]
 
 
 def _areas(surfaces: Sequence[LaneSurface]) -> dict[str, BaseGeometry]:

@@ -1,7 +1,7 @@
 """Model of a site: the parts of a scene from a map and a site description, in local axes."""
 
 from collections import Counter
-from collections.abc import Collection, Generator, Iterable, Iterator, Sequence
+from collections.abc import Collection, Generator, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -20,17 +20,15 @@ from ...site.post_rules import RULES
 from ...site.roles import AREA_OVERLAYS, Role
 from ...site.scene_geometry import ASSUMED, DESCRIBED, OTHER_LEVELS, NamedArea
 from ...site.sources import SourceCount, count_sources
-from ..opendrive.lanes import LaneSurface, lane_surfaces
-from ..opendrive.objects import PlacedObject, placed_objects
-from ..opendrive.road_map import Road, RoadMap
-from ..opendrive.signals import PlacedSignal, placed_signals
+from ..opendrive.lanes import LaneSurface
+from ..opendrive.objects import PlacedObject, extent_in_plan
+from ..opendrive.signals import PlacedSignal
 from . import road_surface, street_furniture
 from .clearing import MAX_IN_LANE, clear
 from .description import MAX_COVERED, Building, PlacedSolid, Poles, SideWay, SiteDescription, Slab, Trees, Wall
-from .footways import without_doubles
 from .geographic_position import in_metres
-from .intersections import without_plain_joints
-from .levels import MIN_LEVEL_HEIGHT, Levels
+from .intersections import enclosed, ring_roads
+from .levels import MIN_LEVEL_HEIGHT, UNNAMED_ROAD, Levels
 from .map_furniture import (
     CROWN_SHARE,
     POLE_HEIGHT,
@@ -53,43 +51,12 @@ from .road_checks import road_warnings
 from .road_surface import Roadside, SurfaceLayers, without_crumbs
 from .roofs import house
 from .signal_posts import signal_parts, split_posts
-from .tapers import with_tapers
+from .street_areas import MAX_MAPPED, NOTHING, Sidewalk, StreetAreas, street_areas
+from .street_map import JunctionArea, StreetMap
 from .terrain import Embankments, FlatLand, Relief, Terrain, cut, embankment_width
 
-MAX_FOLD_LENGTH = 25.0  # metres of an edge in one fold: a longer loop is the shape of the road
-
-
-def without_folds(surfaces: Iterable[LaneSurface]) -> tuple[LaneSurface, ...]:
-    """Return the lanes with each fold of an edge collapsed to the point where the edge crosses itself."""
-    return tuple(replace(lane, left=_unfolded(lane.left), right=_unfolded(lane.right)) for lane in surfaces)
-
-
-def _unfolded(edge: Float) -> Float:
-    """Return an edge (n, 3) with folds collapsed to points; lanes with a common edge keep it."""
-    if len(edge) < 4 or shapely.LineString(edge[:, :2]).is_simple:
-        return edge
-    edge = edge.copy()
-    steps = np.hypot(*np.diff(edge[:, :2], axis=0).T)
-    travelled = np.concatenate([[0.0], np.cumsum(steps)])
-    pieces = shapely.linestrings(np.stack([edge[:-1, :2], edge[1:, :2]], axis=1))
-    # Scan segments in order. A fold begins at the first segment that a later one crosses; the last such segment within
-    # `MAX_FOLD_LENGTH` ends it. All points between take the crossing point, so that the number of rows stays the same.
-    first = 0
-    while first < len(pieces) - 2:
-        last = int(np.searchsorted(travelled, travelled[first + 1] + MAX_FOLD_LENGTH))
-        crossing = np.flatnonzero(shapely.intersects(pieces[first], pieces[first + 2 : last])) + first + 2
-        if not len(crossing):
-            first += 1
-            continue
-        stop = int(crossing[-1])
-        meeting = shapely.get_coordinates(shapely.intersection(pieces[first], pieces[stop]))[0]
-        edge[first + 1 : stop + 1] = [*meeting, edge[first + 1 : stop + 1, 2].mean()]
-        first = stop
-    return edge
-
-
-STAGES = 6  # stages of work after the lanes of the map are known
-ROADS_PER_STEP = 20
+STEPS = ("place", "ground", "objects", "carriageway", "pavements", "verge", "checks")
+"""Steps of `street_model` in their order."""
 MIN_HOLE = 0.01  # square metres: smaller holes of a carriageway are rounding
 CANDIDATE_MARGIN = 15.0  # how far outside the region of interest (metres) a new post may stand
 VERGE_STRIP = (0.8, 2.3)  # strip for new posts along roads without pavements: metres from the carriageway
@@ -99,6 +66,7 @@ MAX_GROUND_DISTANCE = 300.0  # largest distance of ground from the extent (metre
 VERGE_SPACING = 12.0
 KERB_STEP, RELIEF_SPACING = 2.5, 6.0  # metres: fine enough for errors of some centimetres on uneven ground
 OVERLAY_SPACING = 4.0  # metres, as for junctions: coarser overlays would cut through the coverage on curved roads
+MIN_PASSAGE = 2.0  # metres above the ground from which on a building leaves room for ways below
 MIN_BRIDGE_HEIGHT = 1.0  # metres above the land from which a road on a bridge is in the air
 MIN_RAMP_HEIGHT = 1.0  # metres above the nearest studied road from which a ramp of another level is in the way
 MIN_WALL = 0.02  # metres: sum of the heights at both ends above which a gap next to a lower road gets a wall
@@ -206,6 +174,10 @@ class _Surroundings:
 
     Parameters
     ----------
+    areas : StreetAreas or None
+        Areas of the street in a network; in OpenDRIVE the surfaces are those of the lanes.
+    built_up : shapely geometry
+        Buildings next to a network and islands of its roundabouts, where no pavement is assumed.
     terrain : Terrain
         Heights of the studied roads, and of the ground next to them.
     ground : Terrain
@@ -214,6 +186,8 @@ class _Surroundings:
 
     origin: Float
     lanes: tuple[LaneSurface, ...]
+    areas: StreetAreas | None
+    built_up: BaseGeometry
     region: BaseGeometry
     extent: BaseGeometry
     roadside: Roadside
@@ -224,75 +198,77 @@ class _Surroundings:
     crossing: "_OtherLevels"
 
     @cached_property
+    def covered(self) -> BaseGeometry:
+        """Area of the lanes in plan."""
+        return road_surface.lane_outline(self.lanes) if self.areas is None else self.areas.whole
+
+    @cached_property
     def lane_interiors(self) -> BaseGeometry:
         """Driving lanes without a strip along their edges, where posts count as standing next to the road."""
         driving = road_surface.lane_outline(road_surface.in_groups(self.lanes, ["driving"]))
         return driving.buffer(-MAX_IN_LANE)
 
 
-def site_model(road_map: RoadMap, description: SiteDescription) -> Generator[Progress, None, SiteModel]:
+def street_model(streets: StreetMap, description: SiteDescription) -> Generator[Progress, None, SiteModel]:
     """Model a place of a map.
 
     Parameters
     ----------
-    road_map : RoadMap
-        Map of the place.
+    streets : StreetMap
+        Streets of the map.
     description : SiteDescription
         Choice of the place, and objects there that the map lacks.
 
     Yields
     ------
     Progress
-        Number of roads converted to lanes, then of completed stages.
+        Number of completed steps.
 
     Raises
     ------
     SeipError
         The junction does not exist, or there is no road at the place or in the region of interest.
     """
-    surfaces = yield from _all_lanes(road_map)
+    road_map, surfaces = streets.road_map, streets.lanes
     if not surfaces:
         raise SeipError(f"map {road_map.name!r} has no lane with an area: give its lanes widths, or use another map")
-    description, place_notes = in_metres(description, road_map, surfaces)
-    surfaces = _mended_lanes(surfaces, description)
-    stages = (Progress(done, STAGES, "streets", counted=False) for done in range(STAGES + 1))
-    yield next(stages)
+    yield _step("place")
     # In map coordinates: the place, its level, and its region.
-    place = Place(road_map, surfaces, description)
+    description, place_notes = in_metres(description, road_map, surfaces)
+    place = Place(road_map, surfaces, description, streets.junctions)
     levels = place.levels()
     place = replace(place, surfaces=levels.studied)
     region = place.region()
     origin = _origin(place, description.relief)
-    yield next(stages)
-    street = _surroundings(levels, place.surfaces, origin, shifted(region, -origin), description)
-    yield next(stages)
+    yield _step("ground")
+    street = _surroundings(streets, levels, origin, shifted(region, -origin), description)
+    yield _step("objects")
     # From here on in local axes: objects of the description and of the map.
     described, clear_notes = _local_description(description, street)
-    objects, covered_notes = _without_covered(_map_objects(road_map, street), described)
-    furniture = _furniture(objects, _map_signals(road_map, street, levels), described, street)
+    objects, covered_notes = _without_covered(_map_objects(streets, street), described)
+    furniture = _furniture(objects, _map_signals(streets, street, levels), described, street)
     other_levels = _other_level_parts(street)
-    yield next(stages)
-    layers = SurfaceLayers(street.lanes, street.extent, fill=description.from_centre_lines)
-    carriageway = _surface_parts(street, layers, fill=description.from_centre_lines)
-    yield next(stages)
-    pavement, pavement_notes = _pavement_parts(street, layers, off_lanes=description.from_centre_lines)
-    ways, way_notes = _side_way_parts(described, street, layers)
-    yield next(stages)
-    laid = [*carriageway, *pavement, *ways]
+    yield _step("carriageway")
+    surface = _surface(street)
+    yield _step("pavements")
+    ways = _side_way_parts(described, street, surface.area)
+    yield _step("verge")
+    laid = [*surface.parts, *ways]
     parts = [
         *laid,
-        _verge_part(street, furniture.parts, laid, from_centre_lines=description.from_centre_lines),
+        _verge_part(street, furniture.parts, laid),
         *other_levels,
         _marking_part(street, stop_lines=bool(furniture.signals or described.signal_poles)),
         *furniture.parts,
         *_overlay_parts(place, described, objects, street),
     ]
+    yield _step("checks")
     names = street_names(road_map)
     seen = _sight_area(street.region, parts)
     occluders = [part for part in (*furniture.parts, *other_levels) if Role.OCCLUDERS in part.roles]
     bare = () if any(_hides(part, seen) for part in occluders) else (NO_OBSTACLES_MESSAGE,)
-    warnings = road_warnings(road_map, (*street.lanes, *street.crossing.lanes), names, origin)
-    yield next(stages)
+    unnamed = UNNAMED_ROAD if description.from_centre_lines else ""
+    warnings = road_warnings(road_map, (*street.lanes, *street.crossing.lanes), names, origin, unnamed)
     return SiteModel(
         name=description.name or _map_title(road_map.name, description.junction),
         origin=origin,
@@ -305,8 +281,7 @@ def site_model(road_map: RoadMap, description: SiteDescription) -> Generator[Pro
             *covered_notes,
             *_level_notes(levels),
             *clear_notes,
-            *pavement_notes,
-            *way_notes,
+            *surface.notes,
             *_furniture_notes(objects, furniture.signals),
         ),
         warnings=(*bare, *warnings),
@@ -316,23 +291,14 @@ def site_model(road_map: RoadMap, description: SiteDescription) -> Generator[Pro
             objects,
             street.region,
             unnamed=UNNAMED_STREET if description.from_centre_lines else "",
-            rings=_ring_roads(road_map, description.roundabouts),
+            rings=ring_roads(road_map.roads, description.roundabouts),
         ),
         attribution=tuple(dict.fromkeys((*road_map.attribution, *description.attribution))),
     )
 
 
-def _mended_lanes(surfaces: tuple[LaneSurface, ...], description: SiteDescription) -> tuple[LaneSurface, ...]:
-    """Return the lanes of a map made from centre lines without plain joints, steps and folds; of others unchanged."""
-    if not description.from_centre_lines:
-        return surfaces
-    jointless = without_plain_joints(surfaces)
-    joints = {
-        lane.road_id: lane.junction_id
-        for lane, kept in zip(surfaces, jointless, strict=True)
-        if lane.junction_id is not None and kept.junction_id is None
-    }
-    return without_folds(with_tapers(jointless, joints))
+def _step(name: str) -> Progress:
+    return Progress(STEPS.index(name), len(STEPS), "streets", counted=False)
 
 
 def _local_description(description: SiteDescription, street: _Surroundings) -> tuple[SiteDescription, tuple[str, ...]]:
@@ -373,19 +339,20 @@ def _local_solid(placed: PlacedSolid, origin: Float) -> PlacedSolid:
     return replace(placed, outline=shifted(placed.outline, -origin), solid=solid)
 
 
-def _map_objects(road_map: RoadMap, street: _Surroundings) -> tuple[PlacedObject, ...]:
+def _map_objects(streets: StreetMap, street: _Surroundings) -> tuple[PlacedObject, ...]:
     """Return the objects of the map within the extent, on the ground, in local axes."""
-    on_map = placed_objects(road_map, area=shifted(street.extent, street.origin))
-    return local_objects((_risen(one, street.relief) for one in on_map), street.origin)
+    area = shifted(street.extent, street.origin)
+    on_map = (_risen(one, street.relief) for one in streets.objects if extent_in_plan(one).intersects(area))
+    return local_objects(on_map, street.origin)
 
 
-def _map_signals(road_map: RoadMap, street: _Surroundings, levels: Levels) -> list[PlacedSignal]:
+def _map_signals(streets: StreetMap, street: _Surroundings, levels: Levels) -> list[PlacedSignal]:
     """Return the signals of the map within the extent and on the studied level, on the ground, in local axes."""
-    away = levels.other_roads()
+    away, area = levels.other_roads(), shifted(street.extent, street.origin)
     return [
         replace(one, position=_risen_place(one.position, street.relief) - street.origin)
-        for one in placed_signals(road_map, area=shifted(street.extent, street.origin))
-        if one.road_id not in away
+        for one in streets.signals
+        if one.road_id not in away and area.intersects(shapely.Point(one.position[:2]))
     ]
 
 
@@ -421,16 +388,6 @@ def _overlay_parts(
         *_area_parts(described, street),
         *_keep_off_parts(described, objects, street),
     ]
-
-
-def _ring_roads(road_map: RoadMap, roundabouts: Sequence[frozenset[str]]) -> frozenset[str]:
-    """Return the ids of the roads between two junctions of one roundabout."""
-
-    def is_ring(road: Road) -> bool:
-        ends = {link.id for link in (road.predecessor, road.successor) if link is not None and link.kind == "junction"}
-        return len(ends) == 2 and any(ends <= one for one in roundabouts)
-
-    return frozenset(road.id for road in road_map.roads if road.junction_id is None and is_ring(road))
 
 
 def _sight_area(region: BaseGeometry, parts: Sequence[Part]) -> BaseGeometry:
@@ -486,16 +443,6 @@ def _furniture_notes(placed: Sequence[PlacedObject], signals: Sequence[Part]) ->
     if trunks:
         trees = counted(trunks, "tree")
         yield f"the map gives {trees} the width of a trunk: the crowns are taken as {CROWN_SHARE:g} times the height"
-
-
-def _all_lanes(road_map: RoadMap) -> Generator[Progress, None, tuple[LaneSurface, ...]]:
-    """Return the lanes of all roads."""
-    surfaces: list[LaneSurface] = []
-    for number, road in enumerate(road_map.roads):
-        if number % ROADS_PER_STEP == 0:
-            yield Progress(number, len(road_map.roads), "roads")
-        surfaces += lane_surfaces(road)
-    return tuple(surfaces)
 
 
 def _level_notes(levels: Levels) -> Iterator[str]:
@@ -608,25 +555,39 @@ def _bridged(lane: LaneSurface, relief: Relief) -> LaneSurface:
 
 
 def _surroundings(
-    levels: Levels,
-    surfaces: Sequence[LaneSurface],
-    origin: Float,
-    region: BaseGeometry,
-    description: SiteDescription,
+    streets: StreetMap, levels: Levels, origin: Float, region: BaseGeometry, description: SiteDescription
 ) -> _Surroundings:
     extent, relief = region.convex_hull.buffer(SCENE_MARGIN, quad_segs=16), description.relief
-    lanes = _strips(surfaces, origin, extent, relief)
+    lanes = _strips(levels.studied, origin, extent, relief)
     if description.from_centre_lines:
         lanes = road_surface.without_loose_ends(lanes, region, extent)
     others = _strips(levels.others, origin, extent, relief, kerbs=False)
-    roadside = road_surface.roadside(lanes)
+    areas, houses = None, NOTHING
+    if streets.junctions:
+        outlines = [one.outline for one in description.buildings if one.base < MIN_PASSAGE]
+        outlines += [one.outline for one in description.solids]
+        rings = ring_roads(streets.road_map.roads, description.roundabouts)
+        islands = enclosed([lane.polygon for lane in lanes if lane.road_id in rings])
+        houses = united([islands, *(shifted(one, -origin) for one in outlines)])
+        sidewalks = [Sidewalk(one.line - origin[:2], one.width) for one in description.ways if one.line is not None]
+        junctions = (_local_junction(one, origin) for one in streets.junctions)
+        near = [one for one in junctions if extent.intersects(one.carriageway)]
+        areas = street_areas(lanes, near, {road.id: road for road in streets.road_map.roads}, sidewalks, houses)
+    roadside = road_surface.roadside(lanes) if areas is None else areas.roadside
     shapely.prepare(roadside.carriageway)
     land = description.relief or description.flat_land
     terrain, ground, crossing = _ground(levels, lanes, others, origin, land)
     beyond = shapely.box(*extent.buffer(10 * road_surface.MAX_STEP).bounds).difference(extent)
     above, below, on_ground = (cut(part, beyond) for part in (crossing.above, crossing.below, crossing.on_ground))
     crossing = replace(crossing, above=above, below=below, on_ground=on_ground)
-    return _Surroundings(origin, lanes, region, extent, roadside, terrain, ground, relief, land, crossing)
+    return _Surroundings(
+        origin, lanes, areas, houses, region, extent, roadside, terrain, ground, relief, land, crossing
+    )
+
+
+def _local_junction(junction: JunctionArea, origin: Float) -> JunctionArea:
+    carriageway, walking = (shifted(area, -origin) for area in (junction.carriageway, junction.walking))
+    return replace(junction, carriageway=carriageway, walking=walking)
 
 
 def _ground(
@@ -715,49 +676,80 @@ def _lifted(
     return on_ground, np.concatenate(in_air)
 
 
-def _surface_parts(street: _Surroundings, layers: SurfaceLayers, *, fill: bool) -> list[Part]:
+@dataclass(frozen=True, eq=False)
+class _Surface:
+    """Parts of the carriageway and of the pavements, their area in plan, and notes."""
+
+    parts: tuple[Part, ...]
+    area: BaseGeometry
+    notes: tuple[str, ...]
+
+
+def _surface(street: _Surroundings) -> _Surface:
+    """Return the surfaces of the street: those of its areas in a network, otherwise those of its lanes."""
+    if street.areas is not None:
+        return _network_surface(street, street.areas)
+    layers = SurfaceLayers(street.lanes, street.extent)
+    carriageway = _surface_parts(street, layers)
+    pavement, notes = _pavement_parts(street, layers)
+    return _Surface((*carriageway, *pavement), layers.area, notes)
+
+
+def _network_surface(street: _Surroundings, areas: StreetAreas) -> _Surface:
+    groups = dict(areas.groups)
+    terrain = Terrain(_triangles(road_surface.in_groups(street.lanes, road_surface.CARRIAGEWAY)))
+    laid = {
+        group: terrain.drape(without_crumbs(area.intersection(street.extent)), spacing=OVERLAY_SPACING)
+        for group, area in groups.items()
+    }
+    pavement = without_crumbs(areas.pavement.intersection(street.extent))
+    triangles = terrain.drape(pavement, spacing=OVERLAY_SPACING, above=road_surface.KERB_HEIGHT)
+    parts, notes = _pavements(street, triangles)
+    return _Surface((*_group_parts(laid), *parts), areas.whole, notes)
+
+
+def _surface_parts(street: _Surroundings, layers: SurfaceLayers) -> list[Part]:
     """Return a part for each group of lanes; small holes of the driving lanes are filled."""
     groups = {road_surface.group(lane) for lane in street.lanes}
     laid = {group: layers.lay_group(group) for group in SURFACES if group in groups}
     if "driving" in laid:
-        whole = road_surface.without_gaps(street.roadside, street.lanes, fill=fill).intersection(street.extent)
+        whole = road_surface.without_gaps(street.roadside, street.lanes).intersection(street.extent)
         gaps = without_crumbs(without(whole, layers.area), least=MIN_HOLE)
         level = Terrain(np.concatenate(list(laid.values())))  # not that of pavements, which are a kerb higher
         filling = layers.lay(level.drape(gaps, spacing=OVERLAY_SPACING), gaps)
         laid["driving"] = np.concatenate([laid["driving"], filling])
+    return _group_parts(laid)
+
+
+def _group_parts(laid: Mapping[str, Float]) -> list[Part]:
     return [
-        Part(
-            name,
-            _solid(laid[group], material),
-            (role,),
-            keep_off="cycle-tracks" if group == "biking" else None,
-        )
+        Part(name, _solid(laid[group], material), (role,), keep_off="cycle-tracks" if group == "biking" else None)
         for group, (name, material, role) in SURFACES.items()
         if group in laid
     ]
 
 
-def _pavement_parts(
-    street: _Surroundings, layers: SurfaceLayers, *, off_lanes: bool
-) -> tuple[list[Part], tuple[str, ...]]:
-    """Return pavements near the region (for posts), those beyond it, kerbs and verges, and notes.
-
-    With ``off_lanes`` pavements are cut where they overlap the carriageway.
-    """
+def _pavement_parts(street: _Surroundings, layers: SurfaceLayers) -> tuple[list[Part], tuple[str, ...]]:
+    """Return pavements of the lanes of a map, see `_pavements`, with corners that the map lacks, and notes."""
     own = layers.lay_group("sidewalk")
-    if off_lanes:
-        own = cut(own, street.roadside.carriageway)
-    if len(own) == 0:
-        verge = _verge_strip(street, street.roadside.sides())
-        return [verge], ("the map has no pavements: new posts may stand on a strip of verge",)
     corners = road_surface.corner_pavements(own, street.lanes, street.roadside.carriageway)
     corners = layers.lay(corners, outline(corners, road_surface.SNAP_GRID))
-    triangles = np.concatenate([own, corners])
-    if off_lanes:
-        notches = road_surface.notch_pavements(triangles, street.roadside.carriageway)
-        notches = layers.lay(notches, outline(notches, road_surface.SNAP_GRID))
-        triangles = np.concatenate([triangles, notches])
-        triangles = cut(triangles, road_surface.slivers(triangles))
+    parts, notes = _pavements(street, np.concatenate([own, corners]))
+    if not len(corners):
+        return parts, notes
+    added, had = (float(np.abs(signed_area(faces)).sum()) for faces in (corners, own))
+    note = (
+        f"the pavements are closed at the corners of junctions, where the map has gaps: {added:,.0f} m² are "
+        f"added to its {had:,.0f} m²"
+    )
+    return parts, (note, *notes)
+
+
+def _pavements(street: _Surroundings, triangles: Float) -> tuple[list[Part], tuple[str, ...]]:
+    """Return pavements (n, 3, 3) near the region (for posts), those beyond it, kerbs and verges, and notes."""
+    if len(triangles) == 0:
+        verge = _verge_strip(street, street.roadside.sides())
+        return [verge], ("the map has no pavements: new posts may stand on a strip of verge",)
     plan = shapely.polygons(triangles[:, :, :2])
     near = shapely.distance(street.region, plan) <= CANDIDATE_MARGIN
     kerbs = road_surface.kerb_faces(triangles, None if street.land is None else KERB_STEP)
@@ -766,39 +758,29 @@ def _pavement_parts(
         Part("Pavements beyond", _solid(triangles[~near], "pavement"), (Role.GROUND,)),
         Part("Kerbs", _solid(kerbs, "kerb"), (Role.GROUND,)),
     ]
-    notes = []
-    if len(corners):
-        added, had = (float(np.abs(signed_area(faces)).sum()) for faces in (corners, own))
-        notes.append(
-            f"the pavements are closed at the corners of junctions, where the map has gaps: {added:,.0f} m² are "
-            f"added to its {had:,.0f} m²"
-        )
-    bare = road_surface.bare_sides(street.roadside, shapely.union_all(plan, grid_size=road_surface.SNAP_GRID))
+    bare = road_surface.bare_sides(
+        street.roadside,
+        shapely.union_all(plan, grid_size=road_surface.SNAP_GRID),
+        road_surface.MAX_PAVEMENT_DISTANCE if street.areas is None else MAX_MAPPED,
+    )
     verge = _verge_strip(street, bare)
-    if verge.solid.faces:
-        parts.append(verge)
-        length = bare.intersection(street.region.buffer(CANDIDATE_MARGIN)).length
-        if length >= 1.0:
-            notes.append(f"{length:,.0f} m of roadside have no pavement: new posts may stand on a strip of verge there")
-    return parts, tuple(notes)
+    if not verge.solid.faces:
+        return parts, ()
+    length = bare.intersection(street.region.buffer(CANDIDATE_MARGIN)).length
+    note = f"{length:,.0f} m of roadside have no pavement: new posts may stand on a strip of verge there"
+    return [*parts, verge], (note,) if length >= 1.0 else ()
 
 
 def _verge_strip(street: _Surroundings, sides: BaseGeometry) -> Part:
     """Return a strip of verge along sides of the carriageway, except where the road continues and next to bridges."""
     inner, outer = VERGE_STRIP
     strip = without(sides.buffer(outer, cap_style="flat"), street.roadside.filled.buffer(inner))
-    strip = without(strip, street.crossing.off_posts.buffer(outer))
+    strip = without(strip, united([street.crossing.off_posts.buffer(outer), street.built_up]))
     near = strip.intersection(street.region.buffer(CANDIDATE_MARGIN))
     return _area_part("Verge strip", near, Role.CANDIDATE_AREAS, street)
 
 
-def _verge_part(
-    street: _Surroundings,
-    furniture: Sequence[Part],
-    surfaces: Sequence[Part],
-    *,
-    from_centre_lines: bool,
-) -> Part:
+def _verge_part(street: _Surroundings, furniture: Sequence[Part], surfaces: Sequence[Part]) -> Part:
     """Return the ground next to all lanes and under all furniture, slightly below the lanes and under their seams.
 
     Parameters
@@ -809,20 +791,15 @@ def _verge_part(
         Parts that stand on the ground; it reaches around them.
     surfaces : sequence of Part
         Surfaces on the ground, which it does not cover.
-    from_centre_lines : bool
-        Whether the map was made from centre lines.
     """
     corners = [part.solid.vertices[:, :2] + part.foot[:2] for part in furniture]
     built_up = shapely.convex_hull(shapely.multipoints(np.concatenate([np.empty((0, 2)), *corners])))
     gardens = built_up.buffer(GROUND_MARGIN).intersection(street.extent.buffer(MAX_GROUND_DISTANCE))
     ground = street.extent if built_up.is_empty else street.extent.union(gardens).convex_hull
-    covered = road_surface.lane_outline(street.lanes).intersection(street.extent)
+    covered = street.covered.intersection(street.extent)
     roads = united([covered, street.crossing.area])
     lanes = roads.buffer(-road_surface.MAX_SEAM, join_style="mitre")
     laid = united([_plan(part) for part in surfaces if {Role.ROADS, Role.GROUND} & set(part.roles)])
-    if from_centre_lines:  # strips of pavement that were too narrow are ground
-        bare = without(covered, laid.buffer(road_surface.MAX_SEAM)).buffer(2 * road_surface.MAX_SEAM)
-        lanes = without(lanes, bare)
     others = without(laid, covered).buffer(-road_surface.MAX_SEAM)
     lanes = lanes if others.is_empty else lanes.union(others)
     lanes = without(lanes, street.crossing.decks.buffer(road_surface.MAX_SEAM, join_style="mitre"))
@@ -840,9 +817,10 @@ def _plan(part: Part) -> BaseGeometry:
 
 
 def _marking_part(street: _Surroundings, *, stop_lines: bool) -> Part:
-    quads = road_surface.markings(street.lanes, street.extent)
+    inside = road_surface.junctions_in_plan(street.lanes) if street.areas is None else street.areas.inside
+    quads = road_surface.markings(street.lanes, street.extent, inside)
     if stop_lines:
-        lines = road_surface.stop_lines(street.lanes)
+        lines = road_surface.stop_lines(street.lanes, inside)
         lines = lines[shapely.contains_xy(street.extent, lines[:, :, :2].mean(axis=1))]
         quads = np.concatenate([quads, lines])
     return Part("Lane markings", _solid(quads, "marking"), (Role.DRESSING,))
@@ -936,35 +914,23 @@ def _with_item_source(part: Part, item: Building | Wall | Slab | Trees | Poles) 
     return sourced
 
 
-def _side_way_parts(
-    description: SiteDescription, street: _Surroundings, layers: SurfaceLayers
-) -> tuple[list[Part], tuple[str, ...]]:
-    """Return ways next to the road by kind, without areas of lanes, buildings and other roads, and notes."""
-    lanes = road_surface.lane_outline(street.lanes)
-    standing: list[Building | PlacedSolid] = [*description.buildings, *description.solids]
+def _side_way_parts(description: SiteDescription, street: _Surroundings, laid: BaseGeometry) -> list[Part]:
+    """Return ways next to the road by kind, without areas of lanes, buildings, other roads and laid surfaces."""
+    on_ground = [one for one in description.buildings if one.base < MIN_PASSAGE]
+    standing: list[Building | PlacedSolid] = [*on_ground, *description.solids]
     houses = shapely.union_all([one.outline for one in standing])
-    covered = [lanes, street.roadside.filled, layers.area, houses, street.crossing.area]
+    covered = [street.covered, street.roadside.filled, laid, houses, street.crossing.area]
     taken = shapely.union_all(covered).buffer(road_surface.MAX_SEAM)
-    pavement = road_surface.lane_outline(road_surface.in_groups(street.lanes, ["sidewalk"]))
-    shapely.prepare(pavement)
-    parts, doubled = [], 0.0
+    parts = []
     for name, material in sorted({(way.name, way.material) for way in description.ways}):
-        areas = []
-        for way in description.ways:
-            if (way.name, way.material) == (name, material):
-                area = way.area
-                if way.line is not None and not pavement.is_empty and area.intersects(street.extent):
-                    area, length = without_doubles(way.line, way.width, pavement)
-                    doubled += length
-                areas.append(area)
+        areas = [way.area for way in description.ways if (way.name, way.material) == (name, material)]
         area = without(shapely.union_all(areas).intersection(street.extent), taken)
         taken = taken.union(area)
         triangles = street.terrain.drape(
             road_surface.without_crumbs(area), spacing=VERGE_SPACING, above=-VERGE_BELOW / 2
         )
         parts.append(Part(name, _solid(triangles, material), (Role.GROUND,)))
-    note = f"{doubled:,.0f} m of footways along a pavement of the street are left out: they are the same pavement"
-    return parts, (note,) if doubled else ()
+    return parts
 
 
 def _pole_parts(description: SiteDescription, street: _Surroundings) -> Iterator[Part]:

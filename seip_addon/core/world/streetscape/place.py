@@ -10,7 +10,7 @@ from shapely.geometry.base import BaseGeometry
 
 from ...arrays import Float
 from ...errors import SeipError
-from ...geometry.plan import closed
+from ...geometry.plan import closed, united
 from ...site.scene_geometry import DEFAULT_WEIGHT
 from ..opendrive.junctions import find_junction, junction_area, nearest_junctions
 from ..opendrive.lanes import LaneSurface
@@ -19,9 +19,19 @@ from . import road_surface
 from .approaches import approach_lanes
 from .description import DEFAULT_RADIUS, MAX_RADIUS, SiteDescription
 from .geographic_position import looks_like_degrees
-from .intersections import JUNCTION_REACH, box_along, filled, intersection, ring_roads, with_other_carriageways
+from .intersections import (
+    JUNCTION_REACH,
+    box_along,
+    intersection,
+    leads_between,
+    ring_roads,
+    with_other_carriageways,
+)
 from .levels import Levels, split_levels
 from .named_places import street_names
+from .street_areas import GAP as JUNCTION_GAP
+from .street_areas import MIN_ISLAND_AREA, TOLERANCE, tapers
+from .street_map import JunctionArea
 
 MIN_SHARE_OF_JUNCTION = 0.5  # share of a junction's area in a region from which on the region includes all of it
 SCENE_MARGIN = 40.0  # metres that the scene extends beyond the region of interest, for occluders at its edge
@@ -40,11 +50,14 @@ class Place:
         Lanes of the map to consider, map coordinates.
     description : SiteDescription
         Choice of the place and its region.
+    junctions : tuple of JunctionArea
+        Areas of the junctions of a network.
     """
 
     road_map: RoadMap
     surfaces: Sequence[LaneSurface]
     description: SiteDescription
+    junctions: tuple[JunctionArea, ...] = ()
 
     @cached_property
     def centre(self) -> Float:
@@ -122,16 +135,29 @@ class Place:
         raise self._no_driving_lane()
 
     def _whole_streets(self, lanes: Sequence[LaneSurface], shift: Float) -> BaseGeometry:
-        """Return the area of lanes (local axes) with the opposite carriageways of their streets and whole junctions."""
+        """Return the area of lanes (local axes) with the opposite carriageways of their streets and whole junctions.
+
+        So are links that begin and end there, such as lanes for turning right, unless they have another name.
+        """
         around = self.within.convex_hull.buffer(SCENE_MARGIN)
         driving = road_surface.in_groups(self.surfaces, ["driving"])
         nearby = road_surface.local_strips(driving, shift, shifted(around, -shift))
         area = with_other_carriageways(lanes, nearby, self._names)
-        numbers = sorted({lane.junction_id for lane in nearby if lane.junction_id is not None})
-        junctions = [filled([lane for lane in nearby if lane.junction_id == number]) for number in numbers]
+        there = {lane.road_id for lane in nearby}
+        joined = [one for one in self.junctions if there & one.roads]
+        junctions = [shifted(one.carriageway, -shift) for one in joined]
+        widened = [one.road for one in tapers(nearby, joined, {road.id: road for road in self.road_map.roads})]
         inside = [one for one in junctions if one.intersection(area).area > MIN_SHARE_OF_JUNCTION * one.area]
-        whole = closed(shapely.union_all([area, *inside]), road_surface.MAX_SEAM)
-        return road_surface.without_crumbs(whole, least=road_surface.MIN_ISLAND_AREA)
+        whole = closed(united([area, *inside]).simplify(TOLERANCE), JUNCTION_GAP)
+        names = {"", *(self._names.get(lane.road_id, "") for lane in lanes)}
+        roads = [own for road, own in road_surface.by_road(nearby).items() if self._names.get(road, "") in names]
+        links = [own for own in roads if all(leads_between(lane, whole) for lane in own)]
+        whole = united([whole, *(lane.polygon for own in links for lane in own)])
+        whole = united([whole, *(one for one in widened if one.intersection(whole.buffer(JUNCTION_GAP)).length > 0)])
+        # Mitred corners of the closing that lie outside the road are no part of it.
+        road = united([*(lane.polygon for lane in nearby), *junctions, *widened]).buffer(JUNCTION_GAP / 2)
+        whole = closed(whole.simplify(TOLERANCE), JUNCTION_GAP).intersection(road)
+        return road_surface.without_crumbs(whole, least=MIN_ISLAND_AREA)
 
     def weighted_areas(self) -> list[tuple[str, BaseGeometry, float]]:
         """Return name, area and weight of the weighted regions.
@@ -203,7 +229,7 @@ class Place:
         """Return the smallest rectangle around a junction's driving lanes, aligned with its roads if possible."""
         if self.description.from_centre_lines:
             driving = road_surface.in_groups(self.surfaces, ["driving"])
-            ring = ring_roads(self.road_map.roads, self._one_place(junction), self.description.roundabouts)
+            ring = ring_roads(self.road_map.roads, self.description.roundabouts, self._one_place(junction))
             around = [shapely.make_valid(lane.polygon) for lane in driving if lane.road_id in ring]
             return box_along(shapely.union_all([self._driving_area(junction), *around]), driving)
         return shapely.minimum_rotated_rectangle(self._driving_area(junction))

@@ -11,7 +11,8 @@ from ..opendrive.road_map import RoadLink, RoadMap
 from .road_surface import CARRIAGEWAY, by_road, in_groups
 
 MAX_GRADE = 0.12  # grade of a carriageway above which a warning is given
-GRADE_LENGTH = 2.0  # metres along a lane over which its grade is measured
+GRADE_LENGTH, GRADE_STEPS = 2.0, (1, 5)
+"""Step along a lane (metres), and numbers of steps over which its grade is measured."""
 MIN_RISE = 0.02  # metres: a rise above that of `MAX_GRADE` by less than this is rounding
 MAX_GAP = 0.1  # metres of height between the ends of two connected lanes
 SAME_END = 0.3  # metres in plan between the ends of two connected lanes at most
@@ -19,7 +20,7 @@ MAX_NAMED = 3  # places in a message at most
 
 
 def road_warnings(
-    road_map: RoadMap, lanes: Sequence[LaneSurface], names: Mapping[str, str], origin: Float
+    road_map: RoadMap, lanes: Sequence[LaneSurface], names: Mapping[str, str], origin: Float, unnamed: str = ""
 ) -> tuple[str, ...]:
     """Return warnings of steep carriageways and of steps between connected lanes, one sentence each.
 
@@ -31,10 +32,13 @@ def road_warnings(
         Names of the streets by the ids of their roads.
     origin : (3,) float64, metres
         Map coordinates of the local origin.
+    unnamed : str
+        Name of roads without one; empty for their ids, which mean nothing in a map made of an extract.
     """
     driven = in_groups(lanes, CARRIAGEWAY)
-    steep = _worst(steep_places(driven), names, origin, "up to {:.0%} ")
-    gaps = _worst(height_gaps(road_map, driven), names, origin, "{:.2f} m ")
+    called = {road.id: names.get(road.id) or unnamed or f"road {road.id}" for road in road_map.roads}
+    steep = _worst(steep_places(driven), called, origin, "up to {:.1%} ")
+    gaps = _worst(height_gaps(road_map, driven), called, origin, "{:.2f} m ")
     messages = []
     if steep:
         messages.append(
@@ -57,11 +61,17 @@ def steep_places(lanes: Sequence[LaneSurface]) -> Iterator[tuple[float, str, Flo
         if away[-1] <= 0.0:
             continue
         along = np.linspace(0.0, away[-1], max(int(away[-1] / GRADE_LENGTH), 1) + 1)
-        rise = np.abs(np.diff(np.interp(along, away, middle[:, 2])))
-        worst = int(np.argmax(rise))
-        if rise[worst] > MAX_GRADE * along[1] + MIN_RISE:
-            place = [np.interp(along[worst], away, middle[:, axis]) for axis in (0, 1)]
-            yield float(rise[worst] / along[1]), lane.road_id, np.array(place)
+        height = np.interp(along, away, middle[:, 2])
+        # Over a single step, rounded heights hide a grade just above the limit; over several, a short ramp is missed.
+        grades = [(0.0, 0.0)]
+        for steps in GRADE_STEPS:
+            rise = np.abs(height[steps:] - height[:-steps])
+            steep = np.flatnonzero(rise > MAX_GRADE * along[steps : steps + 1] + MIN_RISE)
+            grades += [(float(rise[index] / along[steps]), float(along[index])) for index in steep]
+        steepest, at = max(grades)
+        if steepest > 0.0:
+            place = [np.interp(at, away, middle[:, axis]) for axis in (0, 1)]
+            yield steepest, lane.road_id, np.array(place)
 
 
 def height_gaps(road_map: RoadMap, lanes: Sequence[LaneSurface]) -> Iterator[tuple[float, str, Float]]:
@@ -103,7 +113,7 @@ def _worst(places: Iterator[tuple[float, str, Float]], names: Mapping[str, str],
     """Return the worst place of each street as a text, worst streets first."""
     found: dict[str, tuple[float, Float]] = {}
     for size, road, place in places:
-        name = names.get(road) or f"road {road}"
+        name = names[road]
         if size > found.get(name, (0.0, place))[0]:
             found[name] = (size, place)
     ordered = sorted(found.items(), key=lambda one: (-one[1][0], one[0]))

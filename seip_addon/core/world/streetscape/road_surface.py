@@ -3,6 +3,7 @@
 import dataclasses
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 import shapely
@@ -12,7 +13,6 @@ from shapely.geometry.polygon import orient
 from ...arrays import Float, Integer
 from ...geometry.plan import closed, outline, signed_area, united, without
 from ..opendrive.lanes import LaneSurface
-from .intersections import filled
 from .terrain import Terrain, cut
 
 GROUPS = {
@@ -36,9 +36,6 @@ MAX_STEP = 10.0
 CORNER_NOTCH = 3.0  # notches up to twice this (metres) at the corners of a junction are pavement
 MAX_CORNER, MAX_ENDS = 40.0, 20.0
 """A corner is no longer than this along the carriageway, and along the pavements at its two ends (metres)."""
-SMALL_NOTCH, MIN_NOTCH = 1.25, 0.01
-"""Notches in the edge of a pavement up to twice this (metres) are closed, from this area up (square metres)."""
-MIN_PAVEMENT_WIDTH = 0.6  # metres: narrower strips between lanes are rounding of a map made from centre lines
 JUNCTION_SPACING = 4.0
 KERB_HEIGHT = 0.12
 KERB_DEPTH = 0.35
@@ -54,8 +51,7 @@ MIN_LOOSE_AREA = 400.0  # m²: pieces of streets, with pavements, that reach les
 MAX_SEAM = 0.05  # gaps up to twice this (metres) between the lanes of two roads are closed in outlines
 MAX_OVERLAP = 0.002  # overlaps up to twice this wide (metres) are rounding of edges that meet
 MAX_FOLD = 0.1  # square metres of a road's lanes that may lie on each other, as rounding
-MIN_ISLAND_AREA = 15.0  # m²: smaller holes of a carriageway made from centre lines are not islands
-MAX_HOLE = 4.0  # m²: the same for holes between the lanes of other maps
+MAX_HOLE = 4.0  # m²: smaller holes of a carriageway are not islands
 MAX_ISLAND_AREA = 400.0  # holes of the carriageway smaller than this (m²) are islands, on which no post is assumed
 MAX_MEDIAN_WIDTH = 12.0  # holes narrower than this (metres) are medians: likewise
 MAX_OPEN_MEDIAN_WIDTH = 6.0  # narrower gaps (metres) between carriageways are medians though no junction closes them
@@ -87,8 +83,15 @@ class Roadside:
         return shapely.line_merge(edges) if edges.geom_type == "MultiLineString" else edges
 
 
-def roadside(surfaces: Sequence[LaneSurface]) -> Roadside:
+def roadside(surfaces: Sequence[LaneSurface], carriageway: BaseGeometry | None = None) -> Roadside:
     """Return the carriageway of lanes and its sides.
+
+    Parameters
+    ----------
+    surfaces : sequence of LaneSurface
+        Lanes in local axes.
+    carriageway : shapely geometry, optional
+        Area of the carriageway; by default that of the lanes.
 
     Examples
     --------
@@ -104,12 +107,13 @@ def roadside(surfaces: Sequence[LaneSurface]) -> Roadside:
     100
     """
     paved = in_groups(surfaces, CARRIAGEWAY)
-    carriageway = lane_outline(paved)
+    join: Literal["mitre", "round"] = "mitre" if carriageway is None else "round"
+    carriageway = lane_outline(paved) if carriageway is None else carriageway
     junctions = sorted({lane.junction_id for lane in paved if lane.junction_id is not None})
     inside = [lane_outline([lane for lane in paved if lane.junction_id == junction]) for junction in junctions]
     whole = shapely.union_all([carriageway, *map(_without_holes, inside)])
     # Morphological closing fills gaps between carriageways that are open at an end, and therefore not holes.
-    medians = without(closed(whole, MAX_OPEN_MEDIAN_WIDTH / 2), whole)
+    medians = without(closed(whole, MAX_OPEN_MEDIAN_WIDTH / 2, join), whole)
     filled = _without_holes(closed(whole.union(medians), MAX_SEAM), least=MAX_ISLAND_AREA, narrow=MAX_MEDIAN_WIDTH)
     # A lane that ends at the edge of the filled area leads out of the model: there the edge is not a side of the road.
     # Ends of lanes where another lane follows lie inside, and only touch the edge with a corner.
@@ -120,19 +124,14 @@ def roadside(surfaces: Sequence[LaneSurface]) -> Roadside:
     return Roadside(carriageway, filled, shapely.union_all(across[(length > 2 * MAX_SEAM) & (at_edge > length / 2)]))
 
 
-def bare_sides(roadside: Roadside, pavement: BaseGeometry) -> BaseGeometry:
-    """Return the sides of the carriageway without a pavement, as lines."""
+def bare_sides(roadside: Roadside, pavement: BaseGeometry, distance: float = MAX_PAVEMENT_DISTANCE) -> BaseGeometry:
+    """Return the sides of the carriageway without a pavement within a distance in metres, as lines."""
     sides = roadside.sides()
     if pavement.is_empty or sides.is_empty:
         return sides
-    # For each short piece of a side take the rectangle next to it, away from the carriageway. The side is bare where no
-    # pavement meets it. A test point just left of the piece tells which way is out.
-    lines = [shapely.get_coordinates(line) for line in shapely.get_parts(shapely.segmentize(sides, SIDE_STEP))]
-    start, stop = (np.concatenate([line[cut] for line in lines]) for cut in (slice(-1), slice(1, None)))
-    along = (stop - start) / np.linalg.norm(stop - start, axis=1, keepdims=True)
-    aside = np.column_stack([-along[:, 1], along[:, 0]])
-    inner = shapely.contains_xy(roadside.filled, (start + stop) / 2 + 2 * MAX_SEAM * aside)
-    outwards = MAX_PAVEMENT_DISTANCE * np.where(inner[:, None], -aside, aside)
+    # For each short piece of a side take the rectangle next to it. The side is bare where no pavement meets it.
+    start, stop, outwards = side_pieces(roadside)
+    outwards = distance * outwards
     strips = shapely.polygons(np.stack([start, stop, stop + outwards, start + outwards], axis=1))
     shapely.prepare(pavement)
     is_bare = ~shapely.intersects(pavement, strips)
@@ -140,20 +139,28 @@ def bare_sides(roadside: Roadside, pavement: BaseGeometry) -> BaseGeometry:
     return shapely.union_all([line for line in shapely.get_parts(bare) if line.length >= MIN_SIDE_LENGTH])
 
 
-def without_small_holes(area: BaseGeometry) -> BaseGeometry:
-    """Return an area of lanes without the small holes that these leave between them in junctions."""
-    return _without_holes(area, least=MAX_HOLE)
+def side_pieces(roadside: Roadside) -> tuple[Float, Float, Float]:
+    """Return starts and ends of short pieces of the sides, and the directions away from the road, (n, 2) each."""
+    pieces = shapely.get_parts(shapely.segmentize(roadside.sides(), SIDE_STEP))
+    lines = [np.empty((0, 2)), *(shapely.get_coordinates(line) for line in pieces)]
+    start, stop = (np.concatenate([line[cut] for line in lines]) for cut in (slice(-1), slice(1, None)))
+    along = (stop - start) / np.linalg.norm(stop - start, axis=1, keepdims=True)
+    aside = np.column_stack([-along[:, 1], along[:, 0]])
+    # A test point just left of the piece tells which way is out.
+    inner = shapely.contains_xy(roadside.filled, (start + stop) / 2 + 2 * MAX_SEAM * aside)
+    return start, stop, np.where(inner[:, None], -aside, aside)
 
 
-def without_gaps(roadside: Roadside, surfaces: Sequence[LaneSurface], *, fill: bool) -> BaseGeometry:
-    """Return the area of the carriageway with holes and seams that are too small for islands.
+def without_small_holes(area: BaseGeometry, least: float = MAX_HOLE) -> BaseGeometry:
+    """Return an area of lanes without the small holes, in m², that these leave between them in junctions."""
+    return _without_holes(area, least=least)
 
-    With ``fill``, for maps made from centre lines, these lie where the number of lanes changes, and between lanes. For
-    other maps only the holes themselves are returned: gaps between turning lanes in a junction that no lane of a
-    different kind covers.
+
+def without_gaps(roadside: Roadside, surfaces: Sequence[LaneSurface]) -> BaseGeometry:
+    """Return the holes of the carriageway that are too small for islands.
+
+    These are gaps between turning lanes in a junction that no lane of a different kind covers.
     """
-    if fill:
-        return _without_holes(roadside.carriageway, least=MIN_ISLAND_AREA)
     holes = without(without_small_holes(roadside.carriageway), roadside.carriageway)
     return holes if holes.is_empty else without(holes, _plan(in_groups(surfaces, NOT_DRIVEN)))
 
@@ -278,12 +285,10 @@ class SurfaceLayers:
         All lanes, in local axes.
     extent : shapely geometry
         Area to which the surfaces are cut.
-    fill : bool
-        Whether holes between the driving lanes of a junction are filled.
     """
 
-    def __init__(self, surfaces: Sequence[LaneSurface], extent: BaseGeometry, *, fill: bool) -> None:
-        self._surfaces, self._fill = surfaces, fill
+    def __init__(self, surfaces: Sequence[LaneSurface], extent: BaseGeometry) -> None:
+        self._surfaces = surfaces
         self._beyond = shapely.box(*extent.buffer(10 * MAX_STEP).bounds).difference(extent)
         self._laid: list[BaseGeometry] = []
 
@@ -330,13 +335,10 @@ class SurfaceLayers:
 
     def _lay_junction(self, name: str, lanes: Sequence[LaneSurface]) -> Float:
         area = lane_outline(lanes)
-        if name == "driving":
-            area = filled(lanes) if self._fill else area
-        else:
+        if name != "driving":
             number = lanes[0].junction_id
-            # Islands that `filled` adds to the driving lanes belong to these, and must not be laid as pavement as well.
             driving = [lane for lane in in_groups(self._surfaces, ["driving"]) if lane.junction_id == number]
-            area = without_crumbs(without(area, filled(driving) if self._fill and driving else _plan(driving)))
+            area = without_crumbs(without(area, _plan(driving)))
         terrain = Terrain(np.concatenate([lane.triangles for lane in lanes]))
         return self.lay(terrain.drape(area, spacing=JUNCTION_SPACING), area)
 
@@ -388,32 +390,7 @@ def corner_pavements(pavement: Float, surfaces: Sequence[LaneSurface], carriagew
     return Terrain(pavement).drape(shapely.union_all(corners), spacing=MAX_STEP)
 
 
-def notch_pavements(pavement: Float, carriageway: BaseGeometry) -> Float:
-    """Return (n, 3, 3) triangles that close small notches in the edge of pavements (m, 3, 3).
-
-    On the inside of a tight corner the outer edge of the pavement folds, which leaves a notch.
-    """
-    if len(pavement) == 0:
-        return pavement
-    walked = outline(pavement, SNAP_GRID)
-    street = closed(carriageway.union(walked, grid_size=SNAP_GRID), MAX_SEAM)
-    notches = shapely.get_parts(without(closed(street, SMALL_NOTCH), street))
-    found = [notch for notch in notches if notch.area > MIN_NOTCH and notch.distance(walked) < MAX_SEAM]
-    return Terrain(pavement).drape(shapely.union_all(found), spacing=MAX_STEP)
-
-
-def slivers(pavement: Float) -> BaseGeometry:
-    """Return the parts of pavements (n, 3, 3) in plan that are narrower than `MIN_PAVEMENT_WIDTH`."""
-    walked = outline(pavement, SNAP_GRID)
-    # Morphological opening: parts that vanish when the area shrinks and grows again are narrower than the width. It
-    # grows by a seam more, so that rounding at the edge does not count.
-    wide = walked.buffer(-MIN_PAVEMENT_WIDTH / 2, join_style="mitre").buffer(
-        MIN_PAVEMENT_WIDTH / 2 + MAX_SEAM, join_style="mitre"
-    )
-    return shapely.union_all([part for part in shapely.get_parts(without(walked, wide)) if part.area > 0.0])
-
-
-def markings(surfaces: Sequence[LaneSurface], extent: BaseGeometry) -> Float:
+def markings(surfaces: Sequence[LaneSurface], extent: BaseGeometry, inside: BaseGeometry) -> Float:
     """Return (n, 4, 3) quads of the lines along driving lanes, up to the stop lines of junctions.
 
     Parameters
@@ -422,9 +399,11 @@ def markings(surfaces: Sequence[LaneSurface], extent: BaseGeometry) -> Float:
         Lanes in local axes.
     extent : shapely geometry
         Area to which the lines are cut, as the surfaces are.
+    inside : shapely geometry
+        Area of the junctions.
     """
     lanes = {(lane.road_id, lane.section, lane.lane_id): lane for lane in surfaces if lane.junction_id is None}
-    painted = without(extent, _junctions(surfaces).buffer(STOP_LINE_SETBACK + STOP_LINE_WIDTH))
+    painted = without(extent, inside.buffer(STOP_LINE_SETBACK + STOP_LINE_WIDTH))
     shapely.prepare(painted)
     quads = [np.empty((0, 4, 3))]
     for (road, section, number), lane in lanes.items():
@@ -459,9 +438,9 @@ def _painted_once(quads: Float) -> Float:
     return kept
 
 
-def stop_lines(surfaces: Sequence[LaneSurface]) -> Float:
-    """Return (n, 4, 3) quads of stop lines where driving lanes enter a junction."""
-    inside = _junctions(surfaces).buffer(0.3)
+def stop_lines(surfaces: Sequence[LaneSurface], inside: BaseGeometry) -> Float:
+    """Return (n, 4, 3) quads of stop lines where driving lanes enter junctions, whose area is given."""
+    inside = inside.buffer(0.3)
     shapely.prepare(inside)
     quads = [np.empty((0, 4, 3))]
     for lane in in_groups(surfaces, ["driving"]):
@@ -551,7 +530,8 @@ def _skirt(ring: shapely.LinearRing, terrain: Terrain) -> Float:
     return np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
 
 
-def _junctions(surfaces: Sequence[LaneSurface]) -> BaseGeometry:
+def junctions_in_plan(surfaces: Sequence[LaneSurface]) -> BaseGeometry:
+    """Return the area of the driving lanes in junctions."""
     return _plan([lane for lane in in_groups(surfaces, ["driving"]) if lane.junction_id is not None])
 
 
@@ -580,7 +560,7 @@ def _ribbon(path: Float) -> Float:
     if len(path) < 2:
         return np.empty((0, 4, 3))
     along = np.gradient(path[:, :2], axis=0)
-    along /= np.linalg.norm(along, axis=1, keepdims=True)
+    along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-9)  # an edge that turns back has no direction
     aside = np.column_stack([-along[:, 1], along[:, 0], np.zeros(len(path))]) * (MARKING_WIDTH / 2)
     left, right = path + aside + [0, 0, MARKING_ABOVE], path - aside + [0, 0, MARKING_ABOVE]
     return np.stack([right[:-1], right[1:], left[1:], left[:-1]], axis=1)

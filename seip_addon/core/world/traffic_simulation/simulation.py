@@ -1,4 +1,4 @@
-"""Traffic from SUMO (Simulation of Urban MObility, Eclipse) on an OpenDRIVE map; SUMO itself is an optional extra."""
+"""Traffic from SUMO (Simulation of Urban MObility, Eclipse) on a map; SUMO itself is an optional extra."""
 
 from collections.abc import Generator, Iterable, Sequence
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ from ...errors import SeipError
 from ...progress import Progress
 from ...sensing.traffic.source import TrafficFiles
 from ...storage.files import whole_file
-from ...sumo_programs import Sumo, find_sumo, run
+from ...sumo_programs import NETWORK_SUFFIX, Sumo, find_sumo, run
 from ..opendrive.read import read_map
 from ..opendrive.road_map import RoadMap
 from ..streetscape.road_surface import GROUPS
@@ -20,6 +20,7 @@ from .demand import Demand, write_routes
 from .street_network import PARKED_CLASS, StreetNetwork, read_network
 
 STEP_SECONDS = 0.1  # seconds between two steps of the simulation
+MIN_LANE_WIDTH = 1.0  # metres
 SAMPLING_SECONDS = 0.2  # seconds between two samples of the trajectories
 _LANE_CHANGE_SECONDS = 4.0  # seconds; without it SUMO's vehicles jump from lane to lane
 _MAX_SIGNAL_DISTANCE = 60.0  # metres, largest distance of a crosswalk from its traffic light
@@ -80,10 +81,12 @@ def simulate(
     bounds: tuple[float, float, float, float] | None = None,
     sumo: Iterable[Path] = (),
 ) -> Generator[Progress, None, TrafficFiles]:
-    """Simulate traffic on an OpenDRIVE map from 0 to the scenario's duration.
+    """Simulate traffic on a map from 0 to the scenario's duration.
 
     Parameters
     ----------
+    map_path : Path
+        OpenDRIVE map, or network of SUMO (.net.xml).
     bounds : (4,) float, metres, optional
         Rectangle of the map (left, bottom, right, top); only roads that reach into it are used.
     sumo : iterable of Path
@@ -139,22 +142,25 @@ def run_sumo(programs: Sumo, files: TrafficFiles, seed: int, duration: float) ->
 def _network(
     programs: Sumo, map_path: Path, network: Path, signals: SignalPlan, bounds: tuple[float, float, float, float] | None
 ) -> Generator[Progress, None, None]:
-    """Write the network of a map: driving lanes, pavements, crossings where there are traffic lights, parking lanes."""
-    road_map = read_map(map_path)
-    types, plain, nodes = (network.with_name(name) for name in ("lanes.typ.xml", "plain.net.xml", "shapes.nod.xml"))
-    allowed = _LANES | {"none": 'disallow="all"'}
-    _write(types, "types", [f'<type id="{lane}" speed="13.89" {who}/>' for lane, who in allowed.items()])
+    """Write the network of a map: driving lanes, pavements, crossings where there are traffic lights, parking lanes.
+
+    The network of an extract has crossings already; that of an OpenDRIVE map gets them here.
+    """
+    plain, nodes = (network.with_name(name) for name in ("plain.net.xml", "shapes.nod.xml"))
     common: list[object] = [
         *("--offset.disable-normalization", "true", "--no-turnarounds", "true", "--xml-validation", "never"),
         *("--junctions.internal-link-detail", 20, "--no-warnings", "true", "--tls.default-type", "static"),
         *("--tls.green.time", signals.green, "--tls.yellow.time", signals.amber, "--tls.allred.time", signals.all_red),
-        *("--crossings.guess", "true", "--crossings.guess.speed-threshold", 0),
     ]
-    lanes = ["--opendrive.import-all-lanes", "true", "--type-files", types, "--tls.guess", "true"]
-    source = ["--opendrive-files", map_path, *lanes, "--output-file", plain]
-    yield from run(programs, programs.netconvert, [*source, *common], "reading the map")
-    whole = read_network(plain)
-    shapes = _junction_shapes(whole, road_map)
+    shapes: dict[str, Float] = {}
+    if map_path.name.endswith(NETWORK_SUFFIX):
+        plain = map_path
+        whole = read_network(plain)
+    else:
+        common += ["--crossings.guess", "true", "--crossings.guess.speed-threshold", 0]
+        yield from _import_opendrive(programs, map_path, plain, common)
+        whole = read_network(plain)
+        shapes = _junction_shapes(whole, read_map(map_path))
     if bounds is not None:
         if not _reaches_into(whole, bounds):
             raise SeipError(f"{map_path.name} has no road at this site: name the map that the site was built from")
@@ -173,6 +179,20 @@ def _network(
     _write(nodes, "nodes", [f'<node id="{node}" shape="{shape}"/>' for node, shape in corners.items()])
     source = ["--sumo-net-file", plain, "--node-files", nodes, "--tls.rebuild", "true", "--output-file", network]
     yield from run(programs, programs.netconvert, [*source, *common], "laying crosswalks")
+
+
+def _import_opendrive(
+    programs: Sumo, map_path: Path, plain: Path, common: Sequence[object]
+) -> Generator[Progress, None, None]:
+    """Convert an OpenDRIVE map to a network."""
+    types = plain.with_name("lanes.typ.xml")
+    allowed = _LANES | {"none": 'disallow="all"'}
+    _write(types, "types", [f'<type id="{lane}" speed="13.89" {who}/>' for lane, who in allowed.items()])
+    # netconvert closes lanes below a least width, such as the two halves of one lane for both directions.
+    narrow = ["--opendrive.min-width", MIN_LANE_WIDTH, "--opendrive.import-all-lanes", "true"]
+    lanes = [*narrow, "--type-files", types, "--tls.guess", "true"]
+    source = ["--opendrive-files", map_path, *lanes, "--output-file", plain]
+    yield from run(programs, programs.netconvert, [*source, *common], "reading the map")
 
 
 def _junction_shapes(network: StreetNetwork, road_map: RoadMap) -> dict[str, Float]:

@@ -7,7 +7,7 @@ from seip_addon.core.progress import finish
 from seip_addon.core.site.roles import Role
 from seip_addon.core.workflows.site_building import SiteRequest, build_site
 from seip_addon.core.world.elevation.at_place import TerrainRequest
-from seip_addon.core.world.opendrive.read import read_map
+from seip_addon.core.world.openstreetmap.network_map import read_network_map
 from tests.builders.dem_files import origin_at, sampled, write_dem
 from tests.builders.opendrive_text import document, geometry, lane, road, section
 from tests.builders.osm_text import bridge_above, crossing
@@ -92,8 +92,8 @@ def test_streets_of_an_extract_lie_on_the_ground(tmp_path):
     slope = np.linalg.lstsq(np.column_stack([roads[:, :2], np.ones(len(roads))]), roads[:, 2], rcond=None)[0]
     assert slope[:2] == pytest.approx([0.03, -0.05], abs=1e-4)
     assert built.model.origin[2] == 40
-    (tmp_path / "raised.xodr").write_text(built.map_text, encoding="utf-8")
-    raised = read_map(tmp_path / "raised.xodr")
+    (tmp_path / "raised.net.xml").write_text(built.map_text, encoding="utf-8")
+    raised = read_network_map(tmp_path / "raised.net.xml").streets.road_map
     offset = raised.header_offset[:2]
     roads = [each.place(np.array([0.0, each.length / 3, each.length]), np.zeros(3)) for each in raised.roads]
     places = np.concatenate(roads)

@@ -13,7 +13,7 @@ from seip_addon.core.geometry.geo_reference import projection
 from seip_addon.core.progress import finish
 from seip_addon.core.world.opendrive.read import read_map
 from seip_addon.core.world.streetscape.description import SiteDescription
-from seip_addon.core.world.streetscape.model import site_model
+from tests.builders.map_models import site_model
 from tests.builders.opendrive_text import document, geometry, lane, read_text, road, section
 
 AXIS, ECCENTRICITY = 6_378_137.0, math.sqrt(0.00669437999014)

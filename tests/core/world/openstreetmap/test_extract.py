@@ -42,6 +42,10 @@ def test_nodes_outside_a_window_are_passed_over(tmp_path):
     assert len(near.ways) == len(read(path).ways)
 
 
+INLINE = '<way id="2"><nd ref="1" lat="1" lon="1"/><nd ref="2" lat="1" lon="2"/></way>'
+"""A way of Overpass's ``out geom``."""
+
+
 @pytest.mark.parametrize(
     ("text", "complaint"),
     [
@@ -55,6 +59,13 @@ def test_nodes_outside_a_window_are_passed_over(tmp_path):
         (osm('<node lat="0" lon="0"/>'), "not a whole number"),
         (osm(f'<node id="{10**20}" lat="0" lon="0"/>'), "not a whole number below"),
         ("<html/>", "first element is <html>; download the place"),
+        ("<osmChange/>", "list of changes, not an extract: download the place as OpenStreetMap XML"),
+        (
+            ' {"elements": []}',
+            r"is JSON; download the place as OpenStreetMap XML \(.osm\), from Overpass with \[out:xml\]",
+        ),
+        (osm(INLINE), "has ways without nodes: query Overpass with `out body;"),
+        (osm(f'<node id="7" lat="1" lon="1"/>{INLINE}'), "has ways without nodes: query Overpass with `out body;"),
         (osm('<node id="1" lat="0" lon="0"/><way id="2"><nd ref=""/></way>'), "not a whole number"),
     ],
 )
@@ -72,15 +83,51 @@ def test_a_missing_file_and_a_damaged_one_are_named(tmp_path):
         read(path)
 
 
-def test_places_that_are_none_and_repeats_are_counted(tmp_path):
+def test_nodes_without_a_place_and_contradicting_copies_are_counted(tmp_path):
     nodes = ['<node id="1" lat="10" lon="10"/>', '<node id="1" lat="11" lon="10"/>']
     nodes += ['<node id="2" lat="90" lon="0"/>', '<node id="3" lat="0" lon="181"/>', '<node id="4" lat="nan" lon="1"/>']
     nodes += ['<node id="5" lat="0" lon="180"/>', '<node id="6" lat="0" lon="-180"/>', '<node id="7"/>']
     found = read(written(tmp_path, osm("".join(nodes))))
     assert sorted(found.nodes) == [1, 5, 6]
     assert found.nodes[1].latitude == 11
-    assert "1 element twice" in found.notes[0]
+    assert "two versions of 1 element" in found.notes[0]
     assert "4 nodes" in found.notes[1]
+
+
+@pytest.mark.parametrize("order", [1, -1])
+def test_of_two_copies_of_an_element_the_tags_and_nodes_are_kept(tmp_path, order):
+    """Overpass repeats elements without tags (``out skel``) and without nodes (``out tags``)."""
+    signal = '<tag k="highway" v="traffic_signals"/>'
+    street = '<tag k="highway" v="service"/><tag k="oneway" v="-1"/>'
+    refs = '<nd ref="1"/><nd ref="2"/>'
+    copies = [f'<node id="1" lat="1" lon="1">{signal}</node>', f'<way id="9">{refs}{street}</way>']
+    copies += ['<node id="1" lat="1" lon="1"/>', f'<way id="9">{refs}</way>', f'<way id="9">{street}</way>']
+    found = read(written(tmp_path, osm("".join(['<node id="2" lat="1" lon="2"/>', *copies[::order]]))))
+    assert found.nodes[1].tags == {"highway": "traffic_signals"}
+    assert found.ways[9].nodes == (2, 1)
+    assert found.ways[9].tags == {"highway": "service", "oneway": "yes"}
+    assert not found.notes
+
+
+def test_a_one_way_street_against_its_way_is_read_in_driving_direction(tmp_path):
+    tags = {
+        "oneway": "-1",
+        "sidewalk": "left",
+        "cycleway:right": "lane",
+        "lanes:backward": "2",
+        "turn:lanes": "left|",
+    }
+    lines = "".join(f'<tag k="{key}" v="{value}"/>' for key, value in tags.items())
+    body = f'<node id="1" lat="1" lon="1"/><way id="9"><nd ref="1"/><nd ref="2"/>{lines}</way>'
+    way = read(written(tmp_path, osm(body))).ways[9]
+    assert way.nodes == (2, 1)
+    assert way.tags == {
+        "oneway": "yes",
+        "sidewalk": "right",
+        "cycleway:left": "lane",
+        "lanes:forward": "2",
+        "turn:lanes": "left|",
+    }
 
 
 def test_an_extract_that_is_too_large_is_refused(tmp_path, monkeypatch):

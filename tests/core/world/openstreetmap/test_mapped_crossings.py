@@ -6,8 +6,6 @@ import shapely
 
 from seip_addon.core.progress import finish
 from seip_addon.core.workflows.site_building import SiteRequest, build_site
-from seip_addon.core.world.opendrive.objects import placed_objects
-from seip_addon.core.world.opendrive.read import read_map
 from tests.builders.osm_text import Extract, corner_houses
 from tests.sumo_here import needs_sumo
 
@@ -65,13 +63,3 @@ def test_a_crossing_within_the_map_s_junction_lies_where_the_extract_has_it(tmp_
     ((_, area),) = crossings(built(corner_houses(extract), tmp_path)).items()
     assert area.centroid.distance(shapely.Point(9, 0)) < ORIGIN_ROUNDING
     assert area.area == pytest.approx(4 * 6.4, abs=1.0)
-
-
-def test_the_written_map_has_the_same_crossings(tmp_path):
-    site = built(streets(crossing={"highway": "crossing"}), tmp_path)
-    path = tmp_path / "again.xodr"
-    path.write_text(site.map_text, encoding="utf-8")
-    (crossing,) = [one for one in placed_objects(read_map(path)) if one.kind == "crosswalk"]
-    place = crossing.position[:2] - site.model.origin[:2]
-    assert place == pytest.approx(np.array([30.0, 0.0]), abs=ORIGIN_ROUNDING)
-    assert (crossing.length, crossing.width) == pytest.approx((4.0, 6.4), abs=0.1)

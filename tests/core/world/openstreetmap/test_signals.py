@@ -72,10 +72,7 @@ def test_the_direction_of_signals_counts(tmp_path, direction, arms, at_junction)
     assert bool(result.lone_signals) is not at_junction
 
 
-@pytest.mark.parametrize(
-    ("oneway", "inwards", "at_junction"),
-    [("yes", True, True), ("yes", False, False), ("-1", True, False), ("-1", False, True)],
-)
+@pytest.mark.parametrize(("oneway", "inwards", "at_junction"), [("yes", False, False), ("-1", False, True)])
 def test_signals_control_the_traffic_of_a_one_way_street(tmp_path, oneway, inwards, at_junction):
     extract = Extract()
     line = [(0, 0), extract.node(20, 0, highway="traffic_signals"), (200, 0)]

@@ -1,12 +1,14 @@
 """Which ways are streets, and what netconvert is told of them."""
 
+import itertools
+
 import pytest
 from defusedxml.ElementTree import fromstring
 
 from seip_addon.core.progress import finish
 from seip_addon.core.world.openstreetmap.extract import read_extract, window
 from seip_addon.core.world.openstreetmap.handedness import drives_on_the_left
-from seip_addon.core.world.openstreetmap.streets import has_lane_count, is_street, lane_counts, write_streets
+from seip_addon.core.world.openstreetmap.streets import is_street, write_streets
 from tests.builders.osm_text import Extract, dual_carriageway, roundabout
 
 
@@ -44,59 +46,44 @@ def test_what_a_street_is(tags, street):
 
 
 @pytest.mark.parametrize(
-    ("tags", "lanes"),
+    ("left_hand", "tags", "written"),
     [
-        ({"highway": "residential"}, {"forward": 1, "backward": 1}),
-        ({"highway": "primary", "lanes": "4"}, {"forward": 2, "backward": 2}),
-        ({"highway": "primary", "lanes": "3", "lanes:backward": "1"}, {"forward": 2, "backward": 1}),
-        ({"highway": "primary", "lanes": "3", "lanes:forward": "2"}, {"forward": 2, "backward": 1}),
-        ({"highway": "primary", "oneway": "yes", "lanes": "3"}, {"forward": 3}),
-        ({"highway": "motorway"}, {"forward": 2}),
-        ({"highway": "motorway_link"}, {"forward": 1}),
-        ({"highway": "trunk", "oneway": "yes"}, {"forward": 2}),
-        ({"highway": "trunk"}, {"forward": 1, "backward": 1}),
-        ({"highway": "primary"}, {"forward": 1, "backward": 1}),
-        ({"highway": "primary", "oneway": "yes"}, {"forward": 1}),
-        ({"highway": "primary", "junction": "roundabout"}, {"forward": 1}),
-        ({"highway": "primary", "oneway": "yes", "turn:lanes": "left|through|"}, {"forward": 3}),
-        ({"highway": "primary", "turn:lanes:backward": "left|through"}, {"forward": 1, "backward": 2}),
-        ({"highway": "primary", "lanes": "1"}, {"forward": 1, "backward": 1}),
-        ({"highway": "primary", "lanes": "many"}, {"forward": 1, "backward": 1}),
-        ({"highway": "road", "lanes": "2", "lanes:forward": "2", "lanes:backward": "1"}, {"forward": 2, "backward": 1}),
+        (False, {"lanes": 2, "width": 10, "cycleway": "lane"}, ("3.50|1.50|2.50", "3.50|1.50|2.50")),
+        (True, {"lanes": 2, "width": 10, "cycleway": "lane"}, ("2.50|1.50|3.50", "2.50|1.50|3.50")),
+        (True, {"oneway": "yes", "lanes": 2, "width:lanes": "3|5"}, ("2.50|3.00|5.00", "2.50")),
+        (False, {"oneway": "yes", "oneway:bus": "no", "lanes": 3}, ("3.20|3.20|2.50", "3.20|2.50")),
+        (False, {"oneway": "yes", "cycleway": "opposite_lane", "lanes": 1}, ("3.20|2.50", "1.50|2.50")),
     ],
 )
-def test_how_many_lanes_a_street_has(tags, lanes, tmp_path):
-    assert lane_counts(tags) == lanes
+def test_lane_widths_from_left_to_right_in_driving_direction(tmp_path, left_hand, tags, written):
     extract = Extract()
-    extract.way([(-100, 0), (100, 0)], **tags)
-    _, (written,), _ = streets(extract, tmp_path)
-    own = {f"lanes:{way}": str(number) for way, number in lanes.items()} if len(lanes) > 1 else {}
-    assert {key: value for key, value in written.items() if key.startswith("lanes")} == (
-        {"lanes": str(sum(lanes.values()))} | own
-    )
+    extract.way([(-100, 0), (100, 0)], highway="residential", **tags)
+    _, (found,), _ = streets(extract, tmp_path, left_hand=left_hand)
+    forward = found.get("width:lanes:forward", found.get("width:lanes"))
+    assert (forward, found["width:lanes:backward"]) == written
 
 
 @pytest.mark.parametrize(
-    ("tags", "known"),
+    ("cuts", "reverse", "lanes"),
     [
-        ({"highway": "primary"}, False),
-        ({"highway": "primary", "lanes": "0"}, False),
-        ({"highway": "primary", "lanes": "2"}, True),
-        ({"highway": "primary", "lanes:forward": "1"}, False),
-        ({"highway": "primary", "lanes:forward": "1", "turn:lanes:backward": "left|right"}, True),
-        ({"highway": "primary", "oneway": "yes", "turn:lanes": "left|right"}, True),
+        ((0, 12), False, ["2 2"]),
+        ((0, 12), True, ["2 2"]),
+        ((0, 12, 20, 40), False, ["2 1", "2 2", "2 2"]),
+        ((0, 60), False, ["1 1"]),
     ],
 )
-def test_whether_the_extract_gives_the_number_of_lanes(tags, known):
-    assert has_lane_count(tags) is known
-
-
-def test_widths_are_shared_out_over_lanes_beside_pavements_and_cycle_lanes(tmp_path):
+def test_short_pieces_without_lanes_have_those_of_the_wider_neighbour(tmp_path, cuts, reverse, lanes):
     extract = Extract()
-    extract.way([(-100, 0), (100, 0)], highway="residential", width="10", cycleway__both="lane", sidewalk="both")
-    _, (tags,), _ = streets(extract, tmp_path)
-    assert tags["width:lanes:forward"] == tags["width:lanes:backward"] == "3.50|1.50|2.50"
-    assert tags["cycleway:left"] == tags["cycleway:right"] == "lane"
+    usual = {"highway": "primary", "name": "Long Street"}
+    extract.way([(-100, 0), (0, 0)], lanes=3, lanes__forward=2, **usual)
+    extract.way([(cuts[-1], 0), (200, 0)], turn__lanes__forward="left|", turn__lanes__backward="left|", **usual)
+    for piece in itertools.pairwise([(x, 0) for x in cuts]):
+        extract.way(piece[::-1] if reverse else piece, **usual)
+    extract.way([(-100, 0), (-100, 10)], **usual)  # with lanes at one end only
+    result, (_, _, *ways, alone), _ = streets(extract, tmp_path)
+    assert [f"{way['lanes:forward']} {way['lanes:backward']}" for way in ways] == lanes
+    assert len(result.widened) == len(ways) * (lanes != ["1 1"])
+    assert alone["lanes"] == "2"
 
 
 @pytest.mark.parametrize(
@@ -123,6 +110,13 @@ def test_pavements_are_those_of_the_tags_or_usual_for_the_street(tmp_path, tags,
 def test_a_dual_carriageway_has_pavements_at_its_outer_sides(tmp_path, backward):
     _, ways, _ = streets(dual_carriageway(backward=backward), tmp_path)
     assert [way["sidewalk"] for way in ways] == ["right", "right", "both"]
+
+
+def test_no_pavement_on_a_refuge_between_the_lanes_of_a_street(tmp_path):
+    extract = Extract()
+    for points in ([(0, 0), (3, -4), (6, -4), (9, -4), (20, 0)], [(20, 0), (9, 4), (6, 4), (3, 4), (0, 0)]):
+        extract.way(points, highway="secondary", oneway="yes", name="Split Street")
+    assert [way["sidewalk"] for way in streets(extract, tmp_path)[1]] == ["right", "right"]
 
 
 def test_a_roundabout_shows_the_side_and_stays_whole(tmp_path):

@@ -12,7 +12,7 @@ from seip_addon.core.geometry.geo_reference import projection
 from seip_addon.core.progress import finish
 from seip_addon.core.world.openstreetmap.buildings import USUAL_HEIGHT
 from seip_addon.core.world.openstreetmap.extract import read_extract
-from seip_addon.core.world.openstreetmap.plan_shapes import PlanShapes
+from seip_addon.core.world.openstreetmap.plan_shapes import DRAWN_TWICE, PlanShapes
 from seip_addon.core.world.openstreetmap.street_objects import surroundings
 from tests.builders.osm_text import Extract
 
@@ -68,37 +68,64 @@ def test_heights_are_those_of_the_tags(tmp_path, tags, height, base, roof, assum
     assert got == (pytest.approx(height), pytest.approx(base), pytest.approx(roof), assumed)
 
 
-def test_parts_stand_in_place_of_their_outline(tmp_path):
-    extract = Extract()
-    extract.house(0, 20, 30, 10, height="10")
-    extract.house(0, 20, 15, 10, building="no", building__part="yes", height="6")
-    extract.house(15, 20, 15, 10, building="no", building__part="yes", height="10", min_height="3")
-    solids = found(extract, tmp_path)[0].buildings
-    assert sorted((round(one.height), round(one.base)) for one in solids) == [(6, 0), (7, 3)]
-    assert sum(one.outline.area for one in solids) == pytest.approx(300, rel=0.01)
-
-
 def test_the_rest_of_an_outline_stands_where_parts_do_not_fill_it(tmp_path):
     extract = Extract()
     extract.house(0, 20, 30, 10, height="10")
     extract.house(0, 20, 10, 10, building="no", building__part="yes", height="20")
+    extract.house(20, 20, 10, 5, building="no", building__part="yes", min_height="10", height="40")  # on the roof
+    extract.house(50, 20, 30, 10, height="7")
+    extract.house(50, 20, 30, 10, building="no", building__part="yes", height="5", min_height="3")  # on posts
     solids = found(extract, tmp_path)[0].buildings
     assert {one.height: one.outline.area for one in solids} == {
+        2: pytest.approx(300, rel=0.01),
         10: pytest.approx(200, rel=0.01),
         20: pytest.approx(100, rel=0.01),
+        30: pytest.approx(50, rel=0.01),
     }
 
 
-def test_a_relation_has_courtyards_and_its_ways_count_once(tmp_path):
+def test_buildings_and_parts_above_each_other_on_one_outline(tmp_path):
     extract = Extract()
-    whole = extract.area([(0, 20), (40, 20), (40, 60), (0, 60)], building="yes")
+    extract.house(0, 20, 30, 10, height="18")
+    for tags in ({"height": "4"}, {"min_height": "4", "height": "18"}, {"min_height": "4", "height": "18"}):
+        extract.house(0, 20, 30, 10, **({"building": "no", "building__part": "yes"} | tags))
+    extract.house(50, 20, 30, 10, height="6")
+    extract.house(50, 20, 30, 10, building__min_level="2", height="15")
+    extract.house(50, 20, 30, 10, height="9")
+    site, shapes = found(extract, tmp_path)
+    assert sorted((round(one.base), round(one.base + one.height)) for one in site.buildings) == [
+        (0, 4),
+        (0, 6),
+        (4, 18),
+        (6, 15),
+    ]
+    assert shapes.dropped[DRAWN_TWICE] == 2
+
+
+@pytest.mark.parametrize("tagged", ["relation", "outer way", "both"])
+def test_a_relation_has_courtyards_and_its_ways_count_once(tmp_path, tagged):
+    extract = Extract()
+    tags = {"building": "yes", "height": "9"}
+    whole = extract.area([(0, 20), (40, 20), (40, 60), (0, 60)], **(tags if tagged != "relation" else {}))
     inner = extract.area([(10, 30), (30, 30), (30, 50), (10, 50)])
-    extract.relation(
-        [("way", whole, "outer"), ("way", inner, "inner")], type="multipolygon", building="yes", height="9"
-    )
+    members = [("way", whole, "outer"), ("way", inner, "inner")]
+    extract.relation(members, type="multipolygon", **(tags if tagged != "outer way" else {}))
     (building,) = found(extract, tmp_path)[0].buildings
     assert building.outline.area == pytest.approx(1200, rel=0.01)
     assert len(building.outline.interiors) == 1
+    assert building.height == 9
+
+
+@pytest.mark.parametrize(("kind", "width"), [("footway", 2.0), ("service", 3.5), ("cycleway", 2.0)])
+def test_a_way_leads_through_a_building(tmp_path, kind, width):
+    extract = Extract()
+    extract.house(0, 20, 30, 10, height="12")
+    extract.way([(15, 20), (15, 30)], highway=kind, tunnel="building_passage", layer="-1")
+    site, _ = found(extract, tmp_path)
+    assert sorted(round(one.base, 1) for one in site.buildings) == [0, 0, 4.5]
+    (above,) = [one.outline for one in site.buildings if one.base]
+    assert above.area == pytest.approx(10 * width, rel=0.01)
+    assert [way.area.area for way in site.ways] == [pytest.approx(above.area, rel=0.5)]
 
 
 def test_trees_lamps_posts_and_walls(tmp_path):

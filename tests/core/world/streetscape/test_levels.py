@@ -13,8 +13,8 @@ from seip_addon.core.site.roles import Role
 from seip_addon.core.site.scene_geometry import OTHER_LEVELS
 from seip_addon.core.world.opendrive.read import read_map
 from seip_addon.core.world.streetscape.description import SiteDescription
-from seip_addon.core.world.streetscape.model import site_model
 from seip_addon.core.world.streetscape.terrain import FlatLand
+from tests.builders.map_models import site_model
 from tests.builders.opendrive_text import document, geometry, lane, read_text, road, section
 
 MAPS = Path(os.environ.get("SEIP_MAPS") or Path(__file__).resolve().parents[5] / "shared" / "opendrive")

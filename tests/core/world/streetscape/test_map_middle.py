@@ -5,7 +5,7 @@ import pytest
 
 from seip_addon.core.progress import finish
 from seip_addon.core.world.streetscape.description import SiteDescription
-from seip_addon.core.world.streetscape.model import site_model
+from tests.builders.map_models import site_model
 from tests.builders.opendrive_text import document, geometry, read_text, road
 
 

@@ -12,7 +12,7 @@ from seip_addon.core.site.roles import Role
 from seip_addon.core.site.scene_geometry import ASSUMED, FROM_EXTRACT, FROM_MAP, Pole
 from seip_addon.core.world.opendrive.read import read_map
 from seip_addon.core.world.streetscape.description import Poles, SiteDescription
-from seip_addon.core.world.streetscape.model import site_model
+from tests.builders.map_models import site_model
 from tests.builders.plain_street import PLAIN, street
 from tests.builders.street_map import street_map
 

@@ -6,7 +6,7 @@ import pytest
 from seip_addon.core.progress import finish
 from seip_addon.core.world.opendrive.read import read_map
 from seip_addon.core.world.streetscape.description import SiteDescription
-from seip_addon.core.world.streetscape.model import site_model
+from tests.builders.map_models import site_model
 from tests.builders.street_map import street_map
 
 TREE = '<object id="1" type="{kind}" name="{name}" s="80" t="-12" zOffset="0" hdg="0" {size}/>'

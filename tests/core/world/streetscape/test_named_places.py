@@ -7,7 +7,7 @@ import shapely
 
 from seip_addon.core.progress import finish
 from seip_addon.core.world.streetscape.description import SiteDescription
-from seip_addon.core.world.streetscape.model import site_model
+from tests.builders.map_models import site_model
 from tests.builders.opendrive_text import read_text
 from tests.builders.street_map import street_map
 

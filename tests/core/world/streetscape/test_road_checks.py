@@ -5,7 +5,7 @@ import pytest
 
 from seip_addon.core.progress import finish
 from seip_addon.core.world.streetscape.description import SiteDescription
-from seip_addon.core.world.streetscape.model import site_model
+from tests.builders.map_models import site_model
 from tests.builders.opendrive_text import document, geometry, lane, read_text, road, section
 
 
@@ -29,12 +29,12 @@ def warnings(tmp_path, text):
     return [warning for warning in model.warnings if "hide anything" not in warning]
 
 
-@pytest.mark.parametrize(("grade", "steep"), [(0.0, False), (0.1, False), (-0.115, False), (0.2, True), (-1.4, True)])
+@pytest.mark.parametrize(("grade", "steep"), [(0.0, False), (-0.12, False), (0.125, True), (0.2, True), (-1.4, True)])
 def test_a_carriageway_steeper_than_any_street_is_named(tmp_path, grade, steep):
     found = warnings(tmp_path, two_roads(grade))
     assert bool(found) == steep
     if steep:
-        assert found[0].startswith(f"carriageways are steeper than 12%: up to {abs(grade):.0%} on road 1 at (-")
+        assert found[0].startswith(f"carriageways are steeper than 12%: up to {abs(grade):.1%} on road 1 at (-")
 
 
 @pytest.mark.parametrize("turned", [False, True])

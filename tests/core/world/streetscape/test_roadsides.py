@@ -8,7 +8,7 @@ import shapely
 from seip_addon.core.progress import finish
 from seip_addon.core.site.roles import Role
 from seip_addon.core.world.streetscape.description import SiteDescription
-from seip_addon.core.world.streetscape.model import site_model
+from tests.builders.map_models import site_model
 from tests.builders.opendrive_text import document, geometry, lane, read_text, road, section
 
 HERE = SiteDescription(near=(50.0, 0.0), radius=40.0)

@@ -11,7 +11,7 @@ from seip_addon.core.progress import finish
 from seip_addon.core.site.roles import Role
 from seip_addon.core.world.opendrive.read import read_map
 from seip_addon.core.world.streetscape.description import Area, Building, Poles, SiteDescription, Trees
-from seip_addon.core.world.streetscape.model import site_model
+from tests.builders.map_models import site_model
 from tests.builders.street_map import street_map
 
 MAPS = Path(os.environ.get("SEIP_MAPS") or Path(__file__).resolve().parents[5] / "shared" / "opendrive")

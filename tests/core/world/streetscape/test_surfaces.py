@@ -13,9 +13,9 @@ from seip_addon.core.workflows.site_building import SiteRequest, build_site
 from seip_addon.core.world.opendrive.lanes import LaneSurface
 from seip_addon.core.world.opendrive.read import read_map
 from seip_addon.core.world.streetscape.description import SiteDescription
-from seip_addon.core.world.streetscape.model import site_model
 from seip_addon.core.world.streetscape.road_surface import roadside, without_gaps
-from tests.builders.osm_text import crossing
+from tests.builders.map_models import site_model
+from tests.builders.osm_text import Extract
 from tests.builders.street_map import street_map
 from tests.oracles.face_areas import check_surfaces, plan
 from tests.sumo_here import needs_sumo
@@ -66,12 +66,20 @@ def test_a_lane_that_overlaps_another_road_gives_way(tmp_path):
 
 
 @needs_sumo
-def test_a_mapped_footway_beside_the_street_makes_no_second_pavement(tmp_path):
-    extract = crossing()
-    extract.way([(12, 11), (90, 11)], highway="footway", footway="sidewalk")
-    site = finish(build_site(extract.write(tmp_path / "place.osm"), SiteRequest(near_latlon=(52.5, 13.4))))
-    assert not [part for part in site.model.parts if part.name == "Footways"]
-    assert any("m of footways along a pavement" in note for note in site.model.notes)
+@pytest.mark.parametrize("away", [4.0, 8.0])
+def test_a_mapped_sidewalk_is_the_pavement(tmp_path, away):
+    extract = Extract(52.5, 15.0)  # where the map's north is north
+    extract.way([(-200, 0), (0, 0), (200, 0)], highway="secondary", name="East Road", lanes=2)
+    extract.way([(0, -200), (0, 0)], highway="residential", name="South Road")
+    extract.way([(-90, 3.2 + away), (90, 3.2 + away)], highway="footway", footway="sidewalk", width="2")
+    site = finish(build_site(extract.write(tmp_path / "place.osm"), SiteRequest(near_latlon=(52.5, 15.0))))
+    walked = plan([part for part in site.model.parts if part.name.startswith("Pavements")])
+    driven = plan([part for part in site.model.parts if part.name == "Driving lanes"])
+    for x in range(-70, 71, 10):
+        north = shapely.LineString([(x, 0), (x, 30)])
+        kerb, (low, high) = driven.intersection(north).bounds[3], walked.intersection(north).bounds[1::2]
+        assert (low - kerb, high - kerb) == pytest.approx((away - 1.0, away + 1.0), abs=0.1)
+    assert not [part for part in site.model.parts if part.name == "Verge strip"]
 
 
 def strip(low_x, low_y, high_x, high_y, lane_type="driving", road="1"):
@@ -95,9 +103,9 @@ def around(size):
 def test_a_small_gap_between_the_lanes_of_a_junction_is_no_island(size, filled):
     lanes = around(size)
     gap = shapely.box(0, 0, size, size)
-    assert without_gaps(roadside(lanes), lanes, fill=False).contains(gap.centroid) is filled
+    assert without_gaps(roadside(lanes), lanes).contains(gap.centroid) is filled
     median = strip(0, 0, size, size, "median", "5")
-    assert not without_gaps(roadside(lanes), (*lanes, median), fill=False).contains(gap.centroid)
+    assert not without_gaps(roadside(lanes), (*lanes, median)).contains(gap.centroid)
 
 
 def rectangle(road, low_x, low_y, high_x, high_y):

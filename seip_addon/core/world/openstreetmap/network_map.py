@@ -1,0 +1,471 @@
+"""Streets of a network that SUMO's netconvert made of an extract: lanes, junctions, crossings and signals.
+
+A network has lanes as centre lines with a width, and junctions, their pavements and crossings as areas. It is read with
+the package's own XML reader: the module sumolib is not part of every installation of SUMO.
+"""
+
+import itertools
+import math
+import re
+from collections import defaultdict
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from xml.sax.saxutils import unescape
+
+import numpy as np
+import shapely
+from shapely.geometry.base import BaseGeometry
+
+from ...arrays import Float
+from ...errors import SeipError
+from ...geometry.plan import closed, united, without
+from ...progress import finish
+from ...storage.xml_stream import Attributes, read_tags
+from ..opendrive.lanes import LaneSurface
+from ..opendrive.objects import PlacedObject
+from ..opendrive.profile import ZERO_PROFILE, LateralShape, Profile
+from ..opendrive.reference_line import Clothoid, ReferenceLine
+from ..opendrive.road_map import Junction, Road, RoadLink, RoadMap
+from ..opendrive.signals import PlacedSignal
+from ..streetscape.intersections import SAME_DIRECTION
+from ..streetscape.named_places import CROSSING
+from ..streetscape.street_map import JunctionArea, Profiles, StreetMap
+
+_LANE = re.compile(r'(<lane id=")([^"]*)("[^>]*? shape=")([^"]*)"')
+QUOTES = {"&apos;": "'", "&quot;": '"'}
+_Areas = defaultdict[str, list[BaseGeometry]]
+PRECISION = 3  # decimal places of coordinates, metres
+MIN_ARMS = 3  # arms of a junction; where fewer meet, a street continues
+ARM_GAP = 2.0  # metres between two ends of carriageways of one arm at most
+MAX_MERGING = 4  # ends of edges where the directions of one street divide: two of each direction
+LANE_WIDTH = 3.2  # metres: SUMO's width of lanes without one
+CROSSING_WIDTH = 4.0  # metres: the same of crossings
+SLIVER = 0.3  # metres: parts of a junction up to twice this wide between its pavements are no carriageway
+CORNER = 2.0  # metres that the carriageway of a junction extends beyond the lanes through it, at most
+BIKE_LANE = 0.75  # half the width of a cycle lane, metres: between lanes through a junction
+MIN_STEP = 1e-3  # metres between points of a line: closer ones are one point
+MIN_LENGTH = 0.1  # metres: shorter lanes within junctions have no direction
+MAX_MITRE = 2.0  # length of a corner's offset in widths, at most
+LAMP_HEIGHT = 5.0  # metres above the road
+RAILS = {"tram", "rail_urban", "rail", "rail_electric", "rail_fast"}
+ROAD_VEHICLES = {"passenger", "bus", "delivery", "truck", "taxi", "private", "motorcycle"}
+
+
+@dataclass(eq=False)
+class _Lane:
+    """A lane: its type as in OpenDRIVE, "" without a surface, its width in metres, and its line (n, 3)."""
+
+    type: str
+    width: float
+    line: Float
+
+
+@dataclass(eq=False)
+class _Edge:
+    """An edge of the network, with its lanes by their number from the kerb."""
+
+    id: str
+    function: str
+    begin: str
+    end: str
+    name: str
+    lanes: dict[int, _Lane] = field(default_factory=dict)
+
+
+class _Reader:
+    """Handler of a stream of XML that collects the elements of a network."""
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+        self.left_hand = False
+        self.offset, self.projection = np.zeros(2), ""
+        self.edges: dict[str, _Edge] = {}
+        self.shapes: dict[str, Float] = {}
+        self.connections: list[Attributes] = []
+        self._current = ""
+
+    def lane(self, number: str) -> _Lane:
+        """Return a lane by its id: that of its edge, and its number there."""
+        edge, _, index = number.rpartition("_")
+        return self.edges[edge].lanes[int(index)]
+
+    def read_element(self, tag: str, given: Attributes) -> None:
+        """Read an element; an error names the file."""
+        try:
+            self._read(tag, given)
+        except (KeyError, ValueError) as error:
+            raise self.invalid(error) from error
+
+    def invalid(self, error: Exception) -> SeipError:
+        """Return the error of an invalid network."""
+        return SeipError(f"{self.name} is not a valid SUMO network ({error}); write it again with netconvert")
+
+    def _read(self, tag: str, given: Attributes) -> None:
+        if tag == "net":
+            self.left_hand = given.get("lefthand") == "true"
+        elif tag == "location":
+            self.offset = np.array(given["netOffset"].split(","), dtype=np.float64)
+            self.projection = given["projParameter"]
+        elif tag == "edge":
+            self._current = given["id"]
+            function, begin, end, name = (given.get(key, "") for key in ("function", "from", "to", "name"))
+            # netconvert escapes the names of streets twice: "Smith & Sons" arrives as "Smith &amp; Sons".
+            self.edges[self._current] = _Edge(self._current, function, begin, end, unescape(name, QUOTES))
+        elif tag == "lane":
+            default = CROSSING_WIDTH if self.edges[self._current].function == "crossing" else LANE_WIDTH
+            lane = _Lane(_type(given), float(given.get("width", default)), _points(given["shape"]))
+            self.edges[self._current].lanes[int(given["index"])] = lane
+        elif tag == "junction" and given.get("type") != "internal" and given.get("shape"):
+            self.shapes[given["id"]] = _points(given["shape"])
+        elif tag == "connection":
+            self.connections.append(given)
+
+
+@dataclass(frozen=True, eq=False)
+class NetworkMap:
+    """A network of SUMO: its streets, and the file that traffic is simulated on.
+
+    Parameters
+    ----------
+    streets : StreetMap
+        Streets of the network.
+    text : str
+        Content of the file.
+    pieces : mapping of str to (str, float, float)
+        Road of each lane in the file by the id of the lane, and the shares of the road where it begins and ends.
+    """
+
+    streets: StreetMap
+    text: str
+    pieces: Mapping[str, tuple[str, float, float]]
+
+    def raised_text(self, profiles: Profiles) -> str:
+        """Return the file with new heights of the roads."""
+
+        def raised(match: re.Match[str]) -> str:
+            number, low, high = self.pieces.get(match[2], ("", 0.0, 1.0))
+            if number not in profiles:
+                return match[0]
+            line = _points(match[4])
+            along, heights = profiles[number]
+            if len(line) < 2:
+                return match[0]
+            # A lane gets points where its height bends, besides those of its line.
+            own, bends = _shares(line), (along / along[-1] - low) / (high - low)
+            shares = np.unique(np.concatenate([own, bends[(bends > 0.0) & (bends < 1.0)]]))
+            x, y = (np.interp(shares, own, line[:, axis]) for axis in (0, 1))
+            z = np.interp((low + (high - low) * shares) * along[-1], along, heights)
+            rows = np.column_stack([x, y, z]).tolist()
+            shape = " ".join(",".join(f"{value:.{PRECISION}f}" for value in row) for row in rows)
+            return f'{match[1]}{match[2]}{match[3]}{shape}"'
+
+        return _LANE.sub(raised, self.text)
+
+
+def credited(text: str, attribution: Iterable[str]) -> str:
+    """Return the text of a network with credits to the sources of its data, as comments."""
+    lines = "".join(f"<!-- {one.replace('--', '-')} -->\n" for one in attribution)
+    head, mark, rest = text.partition("<net ")
+    return f"{head}{lines}{mark}{rest}"
+
+
+def read_network_map(path: Path) -> NetworkMap:
+    """Read a network of SUMO.
+
+    Each edge is a road, and so is each group of parallel connections within a junction. Lane ids, edges and links are
+    those that OpenDRIVE would have: lanes count from the middle of the street outwards, negative if traffic keeps to
+    the right.
+
+    Parameters
+    ----------
+    path : Path
+        Network (.net.xml) with internal lanes.
+
+    Raises
+    ------
+    SeipError
+        The file cannot be read or is not a network.
+    """
+    reader = _Reader(path.name)
+    try:
+        finish(read_tags(path, reader.read_element))
+        pieces = {f"{edge.id}_{index}": (edge.id, 0.0, 1.0) for edge in reader.edges.values() for index in edge.lanes}
+        streets = _streets(reader, pieces)
+    except KeyError as error:
+        raise reader.invalid(error) from error
+    if not streets.lanes:
+        raise SeipError(f"{path.name} is a SUMO network without streets; write it again with netconvert")
+    return NetworkMap(streets, path.read_text(encoding="utf-8"), pieces)
+
+
+def _streets(reader: _Reader, pieces: dict[str, tuple[str, float, float]]) -> StreetMap:
+    roads = list(_roads(reader, pieces))
+    road_map = RoadMap(
+        name="",
+        header_offset=np.array([*-reader.offset, 0.0, 0.0]),
+        geo_reference=reader.projection,
+        roads=tuple(road for road, _ in roads),
+        junctions=tuple(Junction(number, number) for number in reader.shapes),
+    )
+    lanes = tuple(itertools.chain.from_iterable(lanes for _, lanes in roads))
+    areas = tuple(_junction_areas(reader, lanes, frozenset(_joints(reader))))
+    return StreetMap(road_map, lanes, tuple(_crossings(reader)), tuple(_signals(reader)), areas)
+
+
+def _points(shape: str) -> Float:
+    """Return the points (n, 3) of a shape, without repeated ones."""
+    rows = [[float(value) for value in point.split(",")] for point in shape.split()]
+    points: Float = np.array([(*row, 0.0)[:3] for row in rows])
+    steps = np.hypot(*np.diff(points[:, :2], axis=0).T)
+    apart: Float = points[np.concatenate([[True], steps > MIN_STEP])]
+    return apart
+
+
+def _type(given: Attributes) -> str:
+    """Return the lane type of OpenDRIVE that a lane with some permissions has, "" if it has no surface."""
+    allowed, closed = (set(given.get(key, "").split()) for key in ("allow", "disallow"))
+    if allowed == {"pedestrian"}:
+        return "sidewalk"
+    if allowed == {"bicycle"}:
+        return "biking"
+    if allowed and "all" not in allowed:
+        if allowed & ROAD_VEHICLES:
+            return "driving"
+        return "tram" if allowed & RAILS else ""
+    return "" if "all" in closed else "driving"
+
+
+def _joints(reader: _Reader) -> Iterator[str]:
+    """Yield the junctions where no more than two arms meet, so that a street only continues.
+
+    Carriageways of both directions are one arm if they leave in one direction next to each other, as where a median
+    begins.
+    """
+    neighbours: defaultdict[str, set[str]] = defaultdict(set)
+    ends: defaultdict[str, list[tuple[shapely.LineString, float]]] = defaultdict(list)
+    for edge in reader.edges.values():
+        driven = [lane for lane in edge.lanes.values() if lane.type not in ("", "sidewalk") and len(lane.line) > 1]
+        if edge.function or not driven:
+            continue
+        neighbours[edge.begin].add(edge.end)
+        neighbours[edge.end].add(edge.begin)
+        for node, row, onward in ((edge.begin, 0, 1), (edge.end, -1, -2)):
+            outer, inner = driven[0].line, driven[-1].line
+            x, y = (inner[onward] - inner[row])[:2]
+            ends[node].append((shapely.LineString([outer[row, :2], inner[row, :2]]), math.atan2(y, x)))
+    for node in reader.shapes:
+        across = shapely.union_all([line.buffer((LANE_WIDTH + ARM_GAP) / 2) for line, _ in ends[node]])
+        arms = max(len(shapely.get_parts(across)), _directions([heading for _, heading in ends[node]]))
+        if arms < MIN_ARMS and (len(neighbours[node]) < MIN_ARMS or len(ends[node]) <= MAX_MERGING):
+            yield node
+
+
+def _directions(headings: Sequence[float]) -> int:
+    """Return the number of headings that differ by more than `SAME_DIRECTION` from each other."""
+    found: list[float] = []
+    for heading in headings:
+        if all(abs(math.remainder(heading - other, math.tau)) > SAME_DIRECTION for other in found):
+            found.append(heading)
+    return len(found)
+
+
+def _roads(reader: _Reader, pieces: dict[str, tuple[str, float, float]]) -> Iterator[tuple[Road, list[LaneSurface]]]:
+    """Yield the roads outside and within junctions, with their lanes; add the roads of internal lanes to ``pieces``."""
+    for edge in reader.edges.values():
+        if not edge.function:
+            links = tuple(RoadLink("junction", node) for node in (edge.begin, edge.end))
+            lanes = {number: lane for number, lane in edge.lanes.items() if lane.type and len(lane.line) > 1}
+            if lanes:
+                yield _road(edge.id, edge.name, None, lanes, links, left_hand=reader.left_hand)
+    joints = frozenset(_joints(reader))
+    for (number, before, after), lanes in _connecting(reader, pieces).items():
+        junction = reader.edges[before].end
+        links = (RoadLink("road", before, "end"), RoadLink("road", after, "start"))
+        road, surfaces = _road(number, "", junction, lanes, links, left_hand=reader.left_hand)
+        # Where a street only continues, its lanes are those of the street.
+        yield road, [replace(one, junction_id=None) for one in surfaces] if junction in joints else surfaces
+
+
+def _connecting(
+    reader: _Reader, pieces: dict[str, tuple[str, float, float]]
+) -> dict[tuple[str, str, str], dict[int, _Lane]]:
+    """Return the lanes within junctions by road: the first internal edge, and the edges before and after it."""
+    # A turn on which vehicles wait inside the junction has several internal lanes in a row.
+    onward = {f"{one['from']}_{one['fromLane']}": one for one in reader.connections if one["from"].startswith(":")}
+    found: dict[tuple[str, str, str], dict[int, _Lane]] = {}
+    for one in reader.connections:
+        via = one.get("via")
+        if one["from"].startswith(":") or via is None:
+            continue
+        first, _, index = via.rpartition("_")
+        if reader.edges[first].function != "internal":
+            continue
+        chain = []
+        while via is not None:
+            chain.append(via)
+            via = onward[via].get("via") if via in onward else None
+        parts = [reader.lane(one).line for one in chain]
+        ends = np.concatenate([[0.0], np.cumsum([max(_length(part), MIN_STEP) for part in parts])])
+        ends /= ends[-1]
+        pieces |= {one: (first, *span) for one, span in zip(chain, itertools.pairwise(ends.tolist()), strict=True)}
+        line = np.concatenate(parts)
+        line = line[np.concatenate([[True], np.hypot(*np.diff(line[:, :2], axis=0).T) > MIN_STEP])]
+        source, target = (reader.lane(f"{one[end]}_{one[f'{end}Lane']}") for end in ("from", "to"))
+        if _length(line) > MIN_LENGTH and source.type and target.type:
+            # A cycle lane that leads into a driving lane ends where the junction begins.
+            kind = source.type if source.type == target.type else "driving"
+            lanes = found.setdefault((first, one["from"], one["to"]), {})
+            lanes[int(index)] = _Lane(kind, min(source.width, target.width), line)
+    return found
+
+
+def _road(
+    number: str,
+    name: str,
+    junction: str | None,
+    lanes: Mapping[int, _Lane],
+    links: Sequence[RoadLink],
+    *,
+    left_hand: bool,
+) -> tuple[Road, list[LaneSurface]]:
+    """Return a road and its lanes; its reference line is the inner edge of the innermost lane."""
+    order = sorted(lanes, reverse=True)  # from the middle of the street outwards
+    # All lanes get the same rows: at the same share of their length, so that neighbours keep a common edge.
+    shares = [_shares(lanes[one].line) for one in order]
+    rows = np.unique(np.round(np.concatenate(shares), 9))
+    lines = (
+        np.column_stack([np.interp(rows, share, lanes[one].line[:, axis]) for axis in range(3)])
+        for one, share in zip(order, shares, strict=True)
+    )
+    edges = [_edges(line, lanes[one].width) for one, line in zip(order, lines, strict=True)]
+    reference = edges[0][1 if left_hand else 0]
+    steps = np.hypot(*np.diff(reference[:, :2], axis=0).T)
+    s = np.concatenate([[0.0], np.cumsum(np.maximum(steps, MIN_STEP))])
+    away = 1 if left_hand else -1
+    surfaces = [
+        LaneSurface(number, junction, 0, away * place, lanes[one].type, left_hand, s, left, right)
+        for place, (one, (left, right)) in enumerate(zip(order, edges, strict=True), start=1)
+    ]
+    heading = np.arctan2(*np.diff(reference[:, :2], axis=0).T[::-1])
+    line = ReferenceLine(
+        s[:-1], np.diff(s), np.column_stack([reference[:-1, :2], heading]), (Clothoid(0.0, 0.0),) * (len(s) - 1)
+    )
+    slopes = np.diff(reference[:, 2]) / np.diff(s)
+    elevation = Profile(s[:-1], np.column_stack([reference[:-1, 2], slopes, np.zeros((len(slopes), 2))]))
+    road = Road(
+        id=number,
+        name=name,
+        junction_id=junction,
+        keeps_left=left_hand,
+        reference_line=line,
+        elevation=elevation,
+        superelevation=ZERO_PROFILE,
+        left_crossfall=ZERO_PROFILE,
+        right_crossfall=ZERO_PROFILE,
+        shape=LateralShape(np.empty(0), ()),
+        lane_offset=ZERO_PROFILE,
+        sections=(),
+        objects=(),
+        signals=(),
+        predecessor=links[0],
+        successor=links[1],
+    )
+    return road, [surface for surface in surfaces if len(surface.triangles)]
+
+
+def _length(line: Float) -> float:
+    return float(np.hypot(*np.diff(line[:, :2], axis=0).T).sum())
+
+
+def _shares(line: Float) -> Float:
+    """Return how far along a line (n, 3) each point is, (n,) from 0 to 1."""
+    travelled = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line[:, :2], axis=0).T))])
+    return np.asarray(travelled / travelled[-1])
+
+
+def _edges(line: Float, width: float) -> tuple[Float, Float]:
+    """Return the left and right edge (n, 3) of a lane along its centre line (n, 3), with mitred corners."""
+    steps = np.diff(line[:, :2], axis=0)
+    units = steps / np.maximum(np.hypot(*steps.T), 1e-9)[:, None]
+    before, after = np.concatenate([units[:1], units]), np.concatenate([units, units[-1:]])
+    # The normals of both pieces at a corner, (a + b) / (1 + a·b), have the offset of both edges: the mitre.
+    cosine = (before * after).sum(axis=1, keepdims=True)
+    along = (before + after) / np.maximum(1.0 + cosine, 2.0 / MAX_MITRE**2)
+    aside = np.column_stack([-along[:, 1], along[:, 0], np.zeros(len(line))]) * width / 2
+    return line + aside, line - aside
+
+
+def _junction_areas(reader: _Reader, lanes: Sequence[LaneSurface], joints: frozenset[str]) -> Iterator[JunctionArea]:
+    """Yield the areas of the junctions."""
+    roads, walking, driven = defaultdict[str, set[str]](set), _Areas(list), _Areas(list)
+    for edge in reader.edges.values():
+        if edge.function == "walkingarea":
+            walking[edge.id[1:].rpartition("_w")[0]] += [_polygon(lane.line) for lane in edge.lanes.values()]
+        elif not edge.function:
+            roads[edge.begin].add(edge.id)
+            roads[edge.end].add(edge.id)
+    for lane in lanes:
+        if lane.junction_id is not None:
+            roads[lane.junction_id].add(lane.road_id)
+            driven[lane.junction_id] += [lane.polygon] * (lane.lane_type == "driving")
+    for node, shape in reader.shapes.items():
+        whole = _polygon(shape)
+        area = _driven_area(without(whole, united(walking[node])), united(driven[node]))
+        walked = united([*walking[node], without(whole, area)])
+        yield JunctionArea(node, area, walked, frozenset(roads[node]), node in joints)
+
+
+def _driven_area(area: BaseGeometry, lanes: BaseGeometry) -> BaseGeometry:
+    """Return the carriageway of a junction from its area without pavements, and from the lanes through it.
+
+    Pavements of edges shorter than the junction reach into it, and some between wide angles lie beyond it: the
+    carriageway is where vehicles drive, and a little more at corners where none turns.
+    """
+    # Morphological opening: where a pavement does not quite reach the outline of the junction, slivers are left.
+    area = area.buffer(-SLIVER, join_style="mitre").buffer(SLIVER, join_style="mitre")
+    if lanes.is_empty:
+        return area
+    filled = united(shapely.Polygon(part.exterior) for part in shapely.get_parts(closed(lanes, BIKE_LANE)))
+    return united([area.intersection(filled.buffer(CORNER)), lanes])
+
+
+def _polygon(line: Float) -> BaseGeometry:
+    """Return the area within a line (n, 3); where that crosses itself, all parts of it."""
+    parts = shapely.get_parts(shapely.make_valid(shapely.Polygon(line[:, :2]))) if len(line) > 2 else []
+    return shapely.union_all([part for part in parts if shapely.get_dimensions(part) == 2])
+
+
+def _crossings(reader: _Reader) -> Iterator[PlacedObject]:
+    """Yield the crossings that netconvert guesses, as areas across the street."""
+    for edge in reader.edges.values():
+        if edge.function == "crossing":
+            for lane in edge.lanes.values():
+                yield crossing(edge.id, "", lane.line[:, :2], lane.width)
+
+
+def crossing(number: str, name: str, line: Float, depth: float) -> PlacedObject:
+    """Return a crossing along a line (n, 2) from kerb to kerb, ``depth`` metres wide."""
+    first, last = line[0], line[-1]
+    x, y = last - first
+    position = np.array([*(first + last) / 2, 0.0])
+    width = float(math.hypot(x, y))
+    heading = math.atan2(y, x) - math.pi / 2
+    return PlacedObject("", number, name, CROSSING, position, heading, 0.0, 0.0, depth, width, 0.0, 0.0, ())
+
+
+def _signals(reader: _Reader) -> Iterator[PlacedSignal]:
+    """Yield the traffic lights: one at the end of each lane that leads into a junction with signals."""
+    seen = set()
+    for one in reader.connections:
+        lane = (one["from"], one.get("fromLane", ""))
+        edge = reader.edges.get(one["from"])
+        if "tl" in one and lane not in seen and edge is not None and not edge.function:
+            seen.add(lane)
+            own = edge.lanes[int(lane[1])]
+            if own.type in ("driving", "tram") and len(own.line) > 1:
+                x, y = (own.line[-1] - own.line[-2])[:2]
+                position = own.line[-1] + [0.0, 0.0, LAMP_HEIGHT]
+                number = f"{one['tl']}_{one['linkIndex']}"
+                heading = math.atan2(y, x)
+                yield PlacedSignal(edge.id, number, "", "1000011", dynamic=True, position=position, yaw=heading)

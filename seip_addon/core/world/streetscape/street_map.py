@@ -1,0 +1,113 @@
+"""Streets of a map as surfaces: lanes, junctions, objects and signals, from OpenDRIVE or a network of SUMO."""
+
+from collections.abc import Generator, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from shapely.geometry.base import BaseGeometry
+
+from ...arrays import Float
+from ...progress import Progress
+from ..opendrive.lanes import LaneSurface, lane_surfaces
+from ..opendrive.objects import PlacedObject, placed_objects
+from ..opendrive.profile import Profile
+from ..opendrive.road_map import RoadMap
+from ..opendrive.signals import PlacedSignal, placed_signals
+from .road_surface import with_rows_at
+
+ROADS_PER_STEP = 20
+Profiles = Mapping[str, tuple[Float, Float]]
+"""Stations (n,) along each road and heights (n,) there, metres, by road id."""
+
+
+@dataclass(frozen=True, eq=False)
+class JunctionArea:
+    """Area in plan of a junction, map coordinates.
+
+    Parameters
+    ----------
+    id : str
+        Id of the junction.
+    carriageway : shapely geometry
+        Area for vehicles.
+    walking : shapely geometry
+        Pavement between the arms.
+    roads : frozenset of str
+        Ids of the roads within it and of those that meet there.
+    is_joint : bool
+        Whether a street only continues there, with other lanes or a different width.
+    """
+
+    id: str
+    carriageway: BaseGeometry
+    walking: BaseGeometry
+    roads: frozenset[str]
+    is_joint: bool
+
+
+@dataclass(frozen=True, eq=False)
+class StreetMap:
+    """A map with the surfaces of its lanes, in map coordinates.
+
+    Parameters
+    ----------
+    road_map : RoadMap
+        Roads with their names and links; those of a network have no lane sections.
+    lanes : tuple of LaneSurface
+        Lanes of all roads.
+    objects : tuple of PlacedObject
+        Objects, among them the crossings.
+    signals : tuple of PlacedSignal
+        Traffic lights and signs.
+    junctions : tuple of JunctionArea
+        Areas of the junctions of a network; empty for OpenDRIVE, whose junctions are the lanes in them.
+    """
+
+    road_map: RoadMap
+    lanes: tuple[LaneSurface, ...]
+    objects: tuple[PlacedObject, ...] = ()
+    signals: tuple[PlacedSignal, ...] = ()
+    junctions: tuple[JunctionArea, ...] = ()
+
+    def raised(self, profiles: Profiles) -> "StreetMap":
+        """Return the streets with new heights of the roads, linear between the given stations."""
+        roads = (
+            replace(road, elevation=_linear(*profiles[road.id])) if road.id in profiles else road
+            for road in self.road_map.roads
+        )
+        lanes = (_raised(lane, *profiles[lane.road_id]) if lane.road_id in profiles else lane for lane in self.lanes)
+        return replace(self, road_map=replace(self.road_map, roads=tuple(roads)), lanes=tuple(lanes))
+
+
+def opendrive_streets(road_map: RoadMap) -> Generator[Progress, None, StreetMap]:
+    """Return the streets of an OpenDRIVE map.
+
+    Yields
+    ------
+    Progress
+        Number of roads converted to lanes.
+
+    Raises
+    ------
+    SeipError
+        A road, object or signal of the map is invalid.
+    """
+    lanes: list[LaneSurface] = []
+    for number, road in enumerate(road_map.roads):
+        if number % ROADS_PER_STEP == 0:
+            yield Progress(number, len(road_map.roads), "roads")
+        lanes += lane_surfaces(road)
+    return StreetMap(road_map, tuple(lanes), placed_objects(road_map), placed_signals(road_map))
+
+
+def _linear(along: Float, heights: Float) -> Profile:
+    lengths = np.diff(along)
+    slopes = np.divide(np.diff(heights), lengths, out=np.zeros(len(lengths)), where=lengths > 0)
+    return Profile(along[:-1], np.column_stack([heights[:-1], slopes, np.zeros((len(slopes), 2))]))
+
+
+def _raised(lane: LaneSurface, along: Float, heights: Float) -> LaneSurface:
+    lane = with_rows_at(lane, along)  # where its height bends
+    height = np.interp(lane.s, along, heights)
+    left, right = (np.column_stack([edge[:, :2], height]) for edge in (lane.left, lane.right))
+    return replace(lane, left=left, right=right)
