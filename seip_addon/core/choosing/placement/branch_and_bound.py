@@ -17,6 +17,7 @@ from dataclasses import dataclass, field, replace
 from heapq import heapify, heappop, heappush
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...arrays import Boolean, Float, Integer
 from ...progress import Progress
@@ -42,7 +43,7 @@ PRODUCT_SHARE = 0.1  # time of a multiplication in a product of matrices, as a s
 REPORTED = 10  # nodes between two reports
 
 
-@dataclass(order=True)
+@dataclass(order=True, slots=True)
 class _Node:
     """A set of placements that has not been searched.
 
@@ -62,9 +63,9 @@ class _Node:
         Parameters of a bound to begin from.
     composition : Composition, optional
         Numbers of sensors of each price.
-    reach : (n,) float64, optional
-        Upper bound on its placements with each candidate left, where these are in no order and not divided yet between
-        this stage and later ones.
+    able : (ceil(n / 8),) uint8, optional
+        Bits of the candidates ``left`` that belong to it, where it shares these with its siblings, in no order: most
+        children are never taken, and there are many of them.
     """
 
     rank: float
@@ -74,7 +75,14 @@ class _Node:
     first: Integer = field(compare=False)
     parameters: Float = field(compare=False)
     composition: Composition | None = field(compare=False, default=None)
-    reach: Float | None = field(compare=False, default=None)
+    able: NDArray[np.uint8] | None = field(compare=False, default=None)
+
+    def unpacked(self) -> _Node:
+        """Return the node with candidates of its own, ascending."""
+        if self.able is None:
+            return self
+        left = np.sort(self.left[np.unpackbits(self.able, count=len(self.left)).view(bool)])
+        return replace(self, left=left, first=left, able=None)
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,7 +141,7 @@ class BranchAndBound:
 
     def left(self) -> Integer:
         """Return the candidates of the best placement and of all open nodes, ascending."""
-        nodes = [*self._open, *self._waiting]
+        nodes = [node.unpacked() for node in (*self._open, *self._waiting)]
         members = [part for node in nodes for part in (node.chosen, node.left)]
         left: Integer = np.unique(np.concatenate([self.incumbent.chosen, *members]))
         return left
@@ -276,18 +284,9 @@ class BranchAndBound:
             rest=rest_of(self.instance, problem.node.chosen, left, problem.node.composition),
         )
 
-    def _divided(self, node: _Node) -> _Node:
-        """Return a node with the candidates left in ascending order, without those that wait for a later stage."""
-        if node.reach is None:
-            return node
-        whole = replace(node, reach=None)
-        self._push_unlikely(whole, node.reach)
-        kept = np.sort(node.left[node.reach >= max(self._goal, self.incumbent.least_better)])
-        return replace(whole, left=kept, first=kept)
-
     def _take(self, node: _Node) -> None:
         """Bound a node, offer the placement that its bound selects, and open its children."""
-        incumbent, node = self.incumbent, self._divided(node)
+        incumbent, node = self.incumbent, node.unpacked()
         left = self._addable(node)
         if not len(left):
             incumbent.offer(node.chosen)
@@ -385,7 +384,8 @@ class BranchAndBound:
         self.incumbent.work.spend(PAIR_OPERATIONS * reach.size)
         for row in np.flatnonzero(most >= self.incumbent.least_better).tolist():
             chosen = np.append(problem.node.chosen, ordered[rows[row]])
-            able = np.flatnonzero(later[row] & (reach[row] >= self.incumbent.least_better))
+            among = later[row] & (reach[row] >= self.incumbent.least_better)
+            able = np.flatnonzero(among)
             if not len(able):
                 self.incumbent.offer(chosen)
             elif block.has_product and rest.count == LISTED - 1:
@@ -394,9 +394,8 @@ class BranchAndBound:
                 bounds = values[row] + gains[row, able]
                 self._list_pairs(problem, chosen, order.candidates[rows[row]], order.candidates[able], bounds)
             else:
-                left, own = ordered[able], reach[row, able]
-                child = replace(problem.node, chosen=chosen, left=left, first=left, reach=own)
-                self._push(child, min(float(most[row]), float(own.max())))
+                child = replace(problem.node, chosen=chosen, left=ordered, first=ordered, able=np.packbits(among))
+                self._push(child, min(float(most[row]), float(reach[row, able].max())))
 
     def _list_pairs(self, problem: _Problem, chosen: Integer, own: int, left: Integer, values: Float) -> None:
         """Offer the placements of a child with up to two sensors more that may be better.

@@ -85,13 +85,17 @@ class Search:
                 best_at = number
             if value > mixtures.get(self._mixture(found), (-math.inf, found))[0]:
                 mixtures[self._mixture(found)] = value, found
-            walk, mixture = (incumbent.value - share * abs(incumbent.value) for share in (WALK_LOSS, MIXTURE_LOSS))
-            current = found if value >= walk and number % RETURN != 0 else incumbent.chosen
+            current = found if self._is_good(value, WALK_LOSS) and number % RETURN != 0 else incumbent.chosen
             if number % 2 and len(self.powers) > 1:
-                good = [one for reached, one in mixtures.values() if reached >= mixture]
+                good = [one for reached, one in mixtures.values() if self._is_good(reached, MIXTURE_LOSS)]
                 current = good[self._random.integers(len(good))]
 
+    def _is_good(self, value: float, loss: float) -> bool:
+        """Return whether a value is worse than the best one by no more than a share."""
+        return value >= self.incumbent.value - loss * abs(self.incumbent.value)
+
     def _mixture(self, chosen: Integer) -> tuple[float, ...]:
+        """Return the prices of sensors in ascending order."""
         return tuple(np.sort(self.instance.price[chosen]).tolist())
 
     def _restarted(self, best: Integer) -> Generator[Progress, None, Integer]:

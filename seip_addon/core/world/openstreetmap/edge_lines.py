@@ -55,7 +55,6 @@ def _read(network: Path, *, left_hand: bool) -> Generator[Progress, None, dict[s
             found[attributes["id"]] = attributes
         elif tag == "junction":
             places[attributes["id"]] = f"{attributes['x']},{attributes['y']}"
-
         elif tag == "lane" and attributes.get("allow") in ("pedestrian", "bicycle"):
             name = attributes["id"].rpartition("_")[0]
             outer[name] = outer.get(name, 0.0) + float(attributes["width"])
