@@ -60,7 +60,8 @@ def test_budget_goes_to_the_heavier_site_and_an_interrupted_run_resumes_beside_a
     output, goal = tmp_path / "city", ("--budget", "20_000", "--gap", "0")
     more = tmp_path / "more.csv"
     rows = "".join(f"{JUNCTION},{54 + number / 100:.2f},7.4,Further {number},1\n" for number in range(12))
-    more.write_text(table.read_text(encoding="utf-8").replace("broken.blend,54.28,7.4,Broken,1\n", rows), encoding="utf-8")
+    sites = table.read_text(encoding="utf-8").replace("broken.blend,54.28,7.4,Broken,1\n", rows)
+    more.write_text(sites, encoding="utf-8")
     command = [sys.executable, "-m", "headless.network", str(more), "-o", str(output), "--workers", "1", *TYPES, *goal]
     started = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, start_new_session=True)  # noqa: S603
     while not list(output.glob("*/problem.npz")):
