@@ -11,7 +11,7 @@ import threading
 import zlib
 from collections.abc import Generator
 from dataclasses import dataclass
-from datetime import UTC, datetime
+from datetime import UTC, date, datetime, timedelta
 from email.utils import parsedate_to_datetime
 from http.client import HTTPException, HTTPResponse
 from pathlib import Path
@@ -28,6 +28,7 @@ from .extract import window
 OVERPASS = "https://overpass-api.de/api/interpreter"
 MAX_REACH = 3_000.0  # metres from a place to the edge of its area: a city has a million elements in 36 km²
 MAX_SIZE = 200_000_000  # bytes of an answer, unpacked
+KEPT_DAYS = 30  # after which a download is deleted, since nobody else does
 MAX_WAIT = 300.0  # seconds that a busy server is waited for at most
 EXPORT = "or export the area from openstreetmap.org and name that file"
 
@@ -243,7 +244,16 @@ def download_extract(
         for start in range(0, len(content), _BLOCK):
             yield Progress(start, len(content), "saving the extract")
             file.write(content[start : start + _BLOCK])
+    _delete_old(server.folder, day)
     return path
+
+
+def _delete_old(folder: Path, day: str) -> None:
+    oldest = (date.fromisoformat(day) - timedelta(KEPT_DAYS)).isoformat()
+    for path in folder.glob("*.osm.gz"):
+        area = _Area.of(path)
+        if area is not None and area.day < oldest:
+            path.unlink(missing_ok=True)
 
 
 def _answer(query: str, server: OverpassServer) -> Generator[Progress, None, bytes]:

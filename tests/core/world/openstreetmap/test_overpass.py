@@ -103,6 +103,12 @@ def test_cache_is_used_for_places_within_a_download_of_the_same_day(stand_in, se
         download(offline, day="2026-11-30")
 
 
+def test_downloads_are_deleted_after_a_month(stand_in, server):
+    stand_in.answers = [Answer(PLACE)] * 3
+    first, second, third = (download(server, day=day) for day in ("2026-10-29", "2026-10-30", "2026-11-29"))
+    assert (first.exists(), second.exists(), third.exists()) == (False, True, True)
+
+
 def test_download_is_outgrown_by_what_it_does_not_contain(stand_in, server, tmp_path):
     stand_in.answers = [Answer(PLACE)]
     path = download(server)
