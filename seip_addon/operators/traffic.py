@@ -55,7 +55,7 @@ class _Scanning(Conditional, LongWork[Result]):
 
 
 class SEIP_OT_load_traffic(Conditional, LongWork[LoadedTraffic], bpy.types.Operator):
-    """Read the traffic file and put its road users on the road, to press play on"""
+    """Read the traffic file and animate its road users on the road"""
 
     bl_idname = "seip.load_traffic"
     bl_label = "Load Traffic"
@@ -88,7 +88,7 @@ def show_traffic(scene: bpy.types.Scene, traffic: SceneTraffic, warnings: Sequen
 
 
 class SEIP_OT_clear_traffic(Conditional, bpy.types.Operator):
-    """Take the loaded road users out of the scene; objects of your own stay"""
+    """Remove the loaded road users from the scene; your own objects stay"""
 
     bl_idname = "seip.clear_traffic"
     bl_label = "Clear Traffic"
@@ -110,7 +110,7 @@ class SEIP_OT_clear_traffic(Conditional, bpy.types.Operator):
 
 
 class SEIP_OT_scan_frame(_Scanning[LastScan], bpy.types.Operator):
-    """Show what the placed sensors measure at the current frame of the timeline"""
+    """Show the point cloud of the placed sensors at the current frame"""
 
     bl_idname = "seip.scan_frame"
     bl_label = "Scan This Frame"
@@ -153,7 +153,7 @@ class SEIP_OT_hide_scan(bpy.types.Operator):
 
 
 class SEIP_OT_write_dataset(_Scanning[tuple[Record, tuple[str, ...]]], bpy.types.Operator):
-    """Scan frame after frame and write them, with the boxes of all road users, as datasets to train detectors on"""
+    """Scan all frames and write them with the boxes of all road users, as datasets for training detectors"""
 
     bl_idname = "seip.write_dataset"
     bl_label = "Write Dataset"
