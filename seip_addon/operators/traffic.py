@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Generator, Sequence
 from pathlib import Path
 
@@ -14,8 +13,8 @@ from ..core.output.results.versions import versions
 from ..core.progress import Progress, finish
 from ..core.sensing.scans.run_folder import Record, Run, check_run_folder
 from ..core.sensing.scans.sensor import MountedSensor
-from ..core.sensing.traffic.source import TrafficFiles, load_traffic
-from ..core.sensing.traffic.trajectories import CATEGORIES, LoadedTraffic, Trajectories
+from ..core.sensing.traffic.source import TrafficFiles, describe_categories, load_traffic
+from ..core.sensing.traffic.trajectories import LoadedTraffic, Trajectories
 from ..core.site.scene_geometry import SceneGeometry
 from ..core.workflows.recording import RecordingSettings, make_run, record, simulation_of
 from ..properties.conversion import output_folder
@@ -214,9 +213,7 @@ class _SceneRead:
 
 def _facts(trajectories: Trajectories) -> list[str]:
     begin, end = trajectories.span
-    counts = Counter(user.category for user in trajectories.users)
-    kinds = [f"{counts[category]} {category}" for category in CATEGORIES if counts[category]]
-    return [f"{counted(len(trajectories), 'road user')}, {begin:g} to {end:g} s", ", ".join(kinds)]
+    return [f"{counted(len(trajectories), 'road user')}, {begin:g} to {end:g} s", describe_categories(trajectories)]
 
 
 CLASSES = (
