@@ -72,7 +72,7 @@ def _update(followed: FollowedSensors, scene: bpy.types.Scene) -> None:
     for label, sensor in sensors.items():
         if label not in followed.sensors or not _same(followed.sensors[label][0], sensor):
             seen = followed.visibility.see(sensor.model, sensor.xyz, sensor.orientation)
-            followed.sensors[label] = (sensor, seen, followed.returns and followed.returns.of(sensor))
+            followed.sensors[label] = (sensor, seen, None if followed.returns is None else followed.returns.of(sensor))
     mounted, rows, returns = zip(*followed.sensors.values(), strict=True) if followed.sensors else ((), (), ())
     seen_by: Integer = np.sum(rows, axis=0, dtype=np.int64)
     followed.coverage = float(np.count_nonzero(seen_by)) / len(seen_by)
@@ -95,7 +95,9 @@ def _as_placed(
 ) -> dict[str, tuple[MountedSensor, Boolean, NDArray[np.float32] | None]]:
     """Return visibility and returns of sensors at candidate poses; those of the others are computed again."""
     seen = zip(deployment.sensors, deployment.rows, strict=True)
-    return {one.label: (one, row, returns and returns.of(one)) for one, row in seen if one.pose is not None}
+    return {
+        one.label: (one, row, None if returns is None else returns.of(one)) for one, row in seen if one.pose is not None
+    }
 
 
 def _same(one: MountedSensor, other: MountedSensor) -> bool:
