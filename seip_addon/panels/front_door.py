@@ -17,6 +17,7 @@ from ..operators.site import (
     SEIP_OT_build_site,
     SEIP_OT_check_site,
     SEIP_OT_choose_map,
+    SEIP_OT_download_map,
     SEIP_OT_load_example,
     missing_for_build,
 )
@@ -30,7 +31,7 @@ DIALOG_WIDTH = 420
 
 
 class SEIP_OT_choose_place(bpy.types.Operator):
-    """Choose the junction that the site is about, and how much of its streets"""
+    """Choose the junction of the site, and the length of its streets"""
 
     bl_idname = "seip.choose_place"
     bl_label = "Import Site"
@@ -105,7 +106,7 @@ class SEIP_MT_main(bpy.types.Menu):
 
 
 STEPS: tuple[tuple[type[bpy.types.Operator], ...], ...] = (
-    (SEIP_OT_load_example, SEIP_OT_choose_map, SEIP_OT_build_site, SEIP_OT_check_site),
+    (SEIP_OT_load_example, SEIP_OT_download_map, SEIP_OT_choose_map, SEIP_OT_build_site, SEIP_OT_check_site),
     (SEIP_OT_add_catalogue, SEIP_OT_preview_beams, SEIP_OT_compute_visibility, SEIP_OT_solve_placement),
     (SEIP_OT_evaluate_sensors, SEIP_OT_export_result),
     (SEIP_OT_colour_coverage, SEIP_OT_save_picture),

@@ -4,6 +4,7 @@ import bpy
 
 from .. import preferences
 from ..core.sensing.visibility.ray_casting import MAX_THREADS
+from ..core.world.openstreetmap.overpass import OVERPASS
 from . import sumo
 
 
@@ -30,12 +31,12 @@ class SEIP_AP_preferences(bpy.types.AddonPreferences):
     cache: bpy.props.StringProperty(
         name="Cache",
         subtype="DIR_PATH",
-        description="Where visibility is kept from run to run; empty for the extension's own folder",
+        description="Folder for stored visibility grids; empty for the extension's own folder",
     )
     python: bpy.props.StringProperty(
         name="Python with PyTorch",
         subtype="FILE_PATH",
-        description="In which Detect runs: .venv/bin/python of a checkout of this project after `make detection`, "
+        description="Python for Detect: .venv/bin/python of a checkout of this project after `make detection`, "
         "or one of your own after `pip install '.[detection]'` there",
     )
     sumo: bpy.props.StringProperty(
@@ -44,6 +45,11 @@ class SEIP_AP_preferences(bpy.types.AddonPreferences):
         description="Folder of Eclipse SUMO, which lays out the streets of an extract of OpenStreetMap and simulates "
         "traffic: the one with bin and data in it. Empty for the SUMO that was installed here, on the PATH or in "
         "SUMO_HOME",
+    )
+    overpass: bpy.props.StringProperty(
+        name="Overpass",
+        description="Address of the Overpass server that extracts of OpenStreetMap are downloaded from",
+        default=OVERPASS,
     )
     catalogues: bpy.props.CollectionProperty(type=SEIP_PG_catalogue_file)
 
@@ -59,6 +65,7 @@ class SEIP_AP_preferences(bpy.types.AddonPreferences):
         layout.prop(self, "python")
         layout.prop(self, "sumo")
         sumo.draw_status(layout)
+        layout.prop(self, "overpass")
         layout.label(text="Catalogues of sensor types")
         for number, file in enumerate(self.catalogues):
             row = layout.row(align=True)
