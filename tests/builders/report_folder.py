@@ -11,7 +11,6 @@ import shapely
 
 from seip_addon.core.choosing.placement.concave import relative_gap
 from seip_addon.core.choosing.placement.deployment import deploy
-from seip_addon.core.choosing.placement.front import front_of
 from seip_addon.core.choosing.placement.objective import (
     FrontPoint,
     Objective,
@@ -21,6 +20,7 @@ from seip_addon.core.choosing.placement.objective import (
 )
 from seip_addon.core.choosing.placement.problem import Placement
 from seip_addon.core.choosing.placement.returns_summary import CrossingReturns
+from seip_addon.core.choosing.placement.solver import front_of
 from seip_addon.core.geometry.geo_reference import GeoReference
 from seip_addon.core.output.pictures.close_ups import save_close_ups
 from seip_addon.core.output.pictures.plan_view import save_plan_view

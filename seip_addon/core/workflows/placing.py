@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from ..acceptance import Acceptance, until_accepted
 from ..choosing.placement.cheapest import cheapest_for_share
 from ..choosing.placement.deployment import Deployment, deploy
-from ..choosing.placement.front import front_of
 from ..choosing.placement.objective import (
     CHOSEN_FOR,
     MOVED,
@@ -28,7 +27,7 @@ from ..choosing.placement.returns_summary import ReturnsPoint
 from ..choosing.placement.risk import NOMINAL, Risk
 from ..choosing.placement.scenarios import Scenarios
 from ..choosing.placement.search_limits import DEFAULT_LIMITS, SolverLimits
-from ..choosing.placement.solver import solve, solve_greedy
+from ..choosing.placement.solver import front_of, solve, solve_greedy
 from ..choosing.robustness.comparison import Comparison
 from ..choosing.robustness.gain_band import with_gain_band
 from ..choosing.robustness.pose_study import pose_study

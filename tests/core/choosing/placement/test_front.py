@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from seip_addon.core.choosing.placement.concave import LOG_RETURNS
-from seip_addon.core.choosing.placement.front import MORE, front_of
 from seip_addon.core.choosing.placement.search_limits import SolverLimits
-from seip_addon.core.choosing.placement.solver import solve
+from seip_addon.core.choosing.placement.solver import MORE, front_of, solve
 from seip_addon.core.progress import finish
 from tests.builders.placement_problems import HALVES, hard_problem, random_problem, row_problem
 

@@ -56,14 +56,16 @@ def test_program_finds_and_proves_what_branch_and_bound_does(solver, returns):
 
 
 @pytest.mark.parametrize("returns", [False, True], ids=["coverage", "returns"])
-def test_bound_of_an_unfinished_program_holds(returns):
+@pytest.mark.parametrize("solver", ["highs", "cbc"])
+def test_bound_of_an_unfinished_program_holds(solver, returns):
     for seed in range(6):
         instance = make_instance(random_problem(seed, returns=returns))
         choices = all_choices(instance)
         if not choices:
             continue
         incumbent, part = worst_of(instance), Work(1e-9)
-        finish(prove_by_program(incumbent, np.arange(len(instance)), "highs", part))
+        finish(prove_by_program(incumbent, np.arange(len(instance)), solver, part))
+        assert part.left <= 0 or incumbent.proven
         assert incumbent.bound >= max(map(instance.value, choices)) - instance.slack
 
 
