@@ -92,7 +92,7 @@ class Search:
         number = best_at = 0
         current = incumbent.chosen
         mixtures = {self._mixture(current): (incumbent.value, current)}
-        cores = self._cores(rank)
+        cores = self.cores(rank)
         while number - best_at < PATIENCE + best_at and work.left > max(last, 0.0):
             core = cores[number % len(cores)]
             number += 1
@@ -104,7 +104,7 @@ class Search:
                 value = instance.value(found)
                 best_at = number if incumbent.value > before + instance.slack else best_at
                 if not all(np.isin(incumbent.chosen, one.among).all() for one in cores):
-                    cores = self._cores(rank)
+                    cores = self.cores(rank)
             if value > mixtures.get(self._mixture(found), (-math.inf, found))[0]:
                 mixtures[self._mixture(found)] = value, found
             current = found if self._is_good(value, WALK_LOSS) and number % RETURN != 0 else incumbent.chosen
@@ -112,7 +112,7 @@ class Search:
                 good = [one for reached, one in mixtures.values() if self._is_good(reached, MIXTURE_LOSS)]
                 current = good[self._random.integers(len(good))]
 
-    def _cores(self, rank: Float) -> list[Search]:
+    def cores(self, rank: Float) -> list[Search]:
         """Return searches among the candidates of highest rank, and those of the best placement."""
         instance, order = self.instance, np.argsort(-rank, kind="stable")
         needed = np.union1d(self.incumbent.chosen, np.flatnonzero(instance.mandatory.any(axis=0)))
