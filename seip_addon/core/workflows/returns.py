@@ -111,7 +111,7 @@ def summary_of(returns: NDArray[np.float32], origins: Float, users: RoadUsers, o
     kinds = [(name, users.body == body) for body, name in enumerate(BODIES)]
     of_each: dict[str, float] = {name: _typical(together[own], in_regions[own]) for name, own in kinds}
     clear = returns.sum(axis=0, dtype=np.float64)
-    enough = {
+    enough: dict[str, float] = {
         name: float(np.average(clear[own] >= ENOUGH_RETURNS[name], weights=in_regions[own])) for name, own in kinds
     }
     typical = _typical(together, user_weights(users, objective))
