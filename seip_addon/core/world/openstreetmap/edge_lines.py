@@ -5,108 +5,70 @@ OpenStreetMap the line of a way is the middle of the carriageway, unless the tag
 """
 
 import itertools
-from collections.abc import Generator, Iterator, Mapping
-from dataclasses import dataclass
-from pathlib import Path
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 
 from ...arrays import Float
-from ...progress import Progress
-from ...storage.xml_stream import Attributes, read_tags
+from ...geometry.plan import beside
+from ..traffic_simulation.street_network import NetworkEdge, StreetNetwork
 from .extract import Way
 from .street_lanes import divider_offset
 
-MAX_MITRE = 2.0  # largest ratio of the length of a mitre at a bend to the distance by which a line is moved
 
-
-@dataclass(frozen=True, eq=False)
-class _Edge:
-    """Ends of an edge, its line (n, 2 or 3), and how far that is to the right of the line of its way, metres."""
-
-    start: str
-    end: str
-    line: Float
-    off: float
-
-
-def moved_edges(network: Path, ways: Mapping[int, Way], *, left_hand: bool) -> Generator[Progress, None, list[str]]:
-    """Return the elements of a file of edges that move those of a network to where the lanes of their ways begin.
+def moved_edges(network: StreetNetwork, ways: Mapping[int, Way]) -> Iterator[str]:
+    """Yield the elements of a file of edges that move those of a network to where the lanes of their ways begin.
 
     Parameters
     ----------
-    network : Path
-        Network of netconvert (.net.xml) in which the lines of edges are those of their ways.
+    network : StreetNetwork
+        Network of netconvert in which the lines of edges are those of their ways.
     ways : mapping of int to Way
         Streets by the id under which they were written for netconvert.
     """
-    edges = yield from _read(network, left_hand=left_hand)
-    return list(_moved_edges(edges, ways, left_hand=left_hand))
-
-
-def _read(network: Path, *, left_hand: bool) -> Generator[Progress, None, dict[str, _Edge]]:
-    """Return the edges of a network outside its junctions by their ids."""
-    places: dict[str, str] = {}
-    found: dict[str, Attributes] = {}
-    outer: dict[str, float] = {}  # widths of the cycle lanes and pavements of each edge
-
-    def start(tag: str, attributes: Attributes) -> None:
-        if tag == "edge" and "function" not in attributes:
-            found[attributes["id"]] = attributes
-        elif tag == "junction":
-            places[attributes["id"]] = f"{attributes['x']},{attributes['y']}"
-        elif tag == "lane" and attributes.get("allow") in ("pedestrian", "bicycle"):
-            name = attributes["id"].rpartition("_")[0]
-            outer[name] = outer.get(name, 0.0) + float(attributes["width"])
-
-    yield from read_tags(network, start, lambda _tag: None, cure="build the site again")
-    edges = {}
-    for name, given in found.items():
-        ends = given["from"], given["to"]
-        text = given.get("shape") or " ".join(places[end] for end in ends)
-        # netconvert moves the line of a street that it centres when it adds cycle lanes and pavements.
-        off = (-0.5 if left_hand else 0.5) * outer.get(name, 0.0) if given.get("spreadType") == "center" else 0.0
-        edges[name] = _Edge(*ends, np.array([point.split(",") for point in text.split()], dtype=np.float64), off)
-    return edges
-
-
-def _moved_edges(edges: Mapping[str, _Edge], ways: Mapping[int, Way], *, left_hand: bool) -> Iterator[str]:
-    leaving: dict[str, list[str]] = {}
-    entering: dict[str, list[str]] = {}
-    for name, edge in edges.items():
-        leaving.setdefault(edge.start, []).append(name)
-        entering.setdefault(edge.end, []).append(name)
-    for name, edge in edges.items():
+    lines = {name: _line(edge, network) for name, edge in network.edges.items()}
+    leaving: dict[str, list[NetworkEdge]] = {}
+    entering: dict[str, list[NetworkEdge]] = {}
+    for edge in network.edges.values():
+        leaving.setdefault(edge.from_node, []).append(edge)
+        entering.setdefault(edge.to_node, []).append(edge)
+    for name, edge in network.edges.items():
         way = ways.get(way_id(name))
         if way is None or "highway" not in way.tags:
             continue
         backward = name.startswith("-")
-        aside = divider_offset(way.tags, left_hand=left_hand) * (-1.0 if backward else 1.0) - edge.off
+        aside = divider_offset(way.tags, left_hand=network.left_hand) * (-1.0 if backward else 1.0)
+        aside -= _off(edge, left_hand=network.left_hand)
         # At a joint with another street the line bends as if both were one, so that moved lines meet there.
-        before = _only(edges[one].line[-2] for one in entering.get(edge.start, ()) if edges[one].start != edge.end)
-        after = _only(edges[one].line[1] for one in leaving.get(edge.end, ()) if edges[one].end != edge.start)
-        line = np.vstack([*before, edge.line[:, :2], *after])
-        moved = np.column_stack([_moved(line, aside)[len(before) :][: len(edge.line)], edge.line[:, 2:]])
-        shape = " ".join(",".join(f"{value:.6f}" for value in point) for point in moved.tolist())
+        before = _only(lines[one.id][-2] for one in entering.get(edge.from_node, ()) if one.from_node != edge.to_node)
+        after = _only(lines[one.id][1] for one in leaving.get(edge.to_node, ()) if one.to_node != edge.from_node)
+        own = lines[name]
+        moved = beside(np.vstack([*before, own, *after]), -aside)[len(before) :][: len(own)]
+        rows = (moved if moved[:, 2].any() else moved[:, :2]).tolist()
+        shape = " ".join(",".join(f"{value:.6f}" for value in row) for row in rows)
         yield f'<edge id="{name}" spreadType="right" shape="{shape}"/>'
+
+
+def _line(edge: NetworkEdge, network: StreetNetwork) -> Float:
+    """Return the line of an edge (n, 3)."""
+    if edge.line is not None:
+        return edge.line
+    return np.array([(*network.nodes[node], 0.0) for node in (edge.from_node, edge.to_node)])
+
+
+def _off(edge: NetworkEdge, *, left_hand: bool) -> float:
+    """Return how far the line of an edge is to the right of the line of its way, metres.
+
+    netconvert moves the line of a street that it centres when it adds cycle lanes and pavements.
+    """
+    outer = sum(lane.width for lane in edge.lanes if lane.allowed in ({"pedestrian"}, {"bicycle"}))
+    return (-0.5 if left_hand else 0.5) * outer if edge.centred else 0.0
 
 
 def _only(points: Iterator[Float]) -> list[Float]:
     """Return the point in a list if there is one only, otherwise an empty list."""
-    found = [point[:2] for point in points]
+    found = list(points)
     return found if len(found) == 1 else []
-
-
-def _moved(line: Float, aside: float) -> Float:
-    """Return a line (n, 2) moved to its right by `aside` metres."""
-    steps = np.diff(line, axis=0)
-    along = steps / np.maximum(np.hypot(*steps.T), 1e-9)[:, None]
-    right = np.column_stack([along[:, 1], -along[:, 0]])
-    # A corner moves along the bisector of its bend, so far that both sides of it move by the same distance.
-    first, second = np.vstack([right[:1], right]), np.vstack([right, right[-1:]])
-    bisector = (first + second) / np.maximum(1.0 + (first * second).sum(axis=1), 2.0 / MAX_MITRE**2)[:, None]
-    moved: Float = line + aside * bisector
-    return moved
 
 
 def way_id(name: str) -> int:

@@ -7,6 +7,7 @@ from pathlib import Path
 from ...errors import SeipError
 from ...progress import Progress
 from ...sumo_programs import find_sumo, run
+from ..traffic_simulation.street_network import read_network
 from .edge_lines import moved_edges
 from .network_map import PRECISION
 from .street_lanes import SIDEWALK_WIDTH
@@ -71,7 +72,7 @@ def convert(
     yield from run(programs, programs.netconvert, options, "streets of the extract")
     # Lanes move to their places in a second run, with the junctions of the first: which nodes netconvert joins to one
     # junction depends on the shapes of the edges between them.
-    moved = yield from moved_edges(first, streets.ways, left_hand=streets.left_hand)
+    moved = moved_edges(read_network(first), streets.ways)
     lines.write_text("\n".join(["<edges>", *moved, "</edges>", ""]), encoding="utf-8")
     options = ["--sumo-net-file", first, "--edge-files", lines, "--output-file", target, "--precision", PRECISION]
     options += [*common, "--crossings.guess", "--junctions.corner-detail", 5, *["--lefthand"] * streets.left_hand]

@@ -24,7 +24,6 @@ from ...geometry.solids import Solid
 from ...site.post_rules import KeepOffArea, RuleName
 from ...site.scene_geometry import DEFAULT_WEIGHT, DESCRIBED, FROM_EXTRACT, FROM_MAP
 from ...storage.toml_table import Key, Reader, is_number, number, parse_toml, read_table, text, toml_text
-from .roofs import FLAT, Roof
 from .terrain import FlatLand, Relief
 
 DEFAULT_RADIUS = 80.0
@@ -34,6 +33,10 @@ MAX_SIZE, MAX_HEIGHT, MAX_RADIUS = limits.SIZE.most, limits.HEIGHT.most, limits.
 MIN_AREA = 1e-4  # square metres below which an outline encloses nothing
 MAX_COVERED = 0.5  # share of a building's outline covered by another source, above which that one replaces it
 MAX_ROW_LENGTH = 10_000  # limit on the trees or lights of a row
+OBJECT_FIELDS = ("buildings", "trees", "walls", "street_lights", "signal_poles", "slabs", "posts", "solids")
+"""Fields of a description with objects that stand at the place."""
+PLACED_FIELDS = (*OBJECT_FIELDS, "ways", "forbidden_areas", "mandatory_areas", "keep_off_areas")
+"""Fields of a description with objects and areas in map coordinates."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,16 +59,14 @@ class WeightedRegion:
 
 @dataclass(frozen=True, eq=False)
 class Building:
-    """A building: ``height`` metres from ``base`` metres above the ground to the ridge.
+    """A building with a flat roof.
 
     Parameters
     ----------
     outline : Polygon
         Outline in plan; courtyards are its holes.
     height, base : float, metres
-        Height from the base to the ridge, and height of the base above the ground.
-    roof : Roof
-        Roof; its height is part of the building's.
+        Height of its top above its base, and of the base above the ground.
     source : str
         Source of the building, as in `scene_geometry.Pole`.
     height_assumed : bool
@@ -75,7 +76,6 @@ class Building:
     outline: Polygon
     height: float
     base: float = 0.0
-    roof: Roof = FLAT
     source: str = DESCRIBED
     height_assumed: bool = False
 
@@ -283,25 +283,13 @@ class SiteDescription:
     @property
     def has_objects(self) -> bool:
         """Whether the description has any objects."""
-        standing = (self.buildings, self.trees, self.walls, self.street_lights, self.signal_poles)
-        return any((*standing, self.slabs, self.posts, self.solids))
+        return any(getattr(self, name) for name in OBJECT_FIELDS)
 
     def with_objects_of(self, other: "SiteDescription") -> "SiteDescription":
         """Return this description with the objects, ways, areas and credits of another one added."""
-        return replace(
-            self,
-            buildings=(*self.buildings, *other.buildings),
-            trees=(*self.trees, *other.trees),
-            walls=(*self.walls, *other.walls),
-            street_lights=(*self.street_lights, *other.street_lights),
-            signal_poles=(*self.signal_poles, *other.signal_poles),
-            slabs=(*self.slabs, *other.slabs),
-            posts=(*self.posts, *other.posts),
-            ways=(*self.ways, *other.ways),
-            solids=(*self.solids, *other.solids),
-            attribution=tuple(dict.fromkeys((*self.attribution, *other.attribution))),
-            keep_off_areas=(*self.keep_off_areas, *other.keep_off_areas),
-        )
+        fields = (*OBJECT_FIELDS, "ways", "keep_off_areas", "attribution")
+        both: dict[str, Any] = {name: (*getattr(self, name), *getattr(other, name)) for name in fields}
+        return replace(self, **both | {"attribution": tuple(dict.fromkeys(both["attribution"]))})
 
     def with_attribution(self, credit: str) -> "SiteDescription":
         """Return this description with one more credit, if it is not empty."""

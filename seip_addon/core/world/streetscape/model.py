@@ -4,6 +4,7 @@ from collections import Counter
 from collections.abc import Collection, Generator, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any, TypeVar
 
 import numpy as np
 import shapely
@@ -16,7 +17,7 @@ from ...geometry.plan import covered_share, outline, signed_area, united, withou
 from ...geometry.solids import Solid, fence, from_faces
 from ...progress import Progress
 from ...site.obstruction import NO_OBSTACLES_MESSAGE, can_hide
-from ...site.post_rules import RULES
+from ...site.post_rules import RULES, KeepOffArea
 from ...site.roles import AREA_OVERLAYS, Role
 from ...site.scene_geometry import ASSUMED, DESCRIBED, OTHER_LEVELS, NamedArea
 from ...site.sources import SourceCount, count_sources
@@ -25,8 +26,19 @@ from ..opendrive.objects import PlacedObject, extent_in_plan
 from ..opendrive.signals import PlacedSignal
 from . import road_surface, street_furniture
 from .clearing import MAX_IN_LANE, clear
-from .description import MAX_COVERED, Building, PlacedSolid, Poles, SideWay, SiteDescription, Slab, Trees, Wall
-from .geographic_position import in_metres
+from .description import (
+    MAX_COVERED,
+    PLACED_FIELDS,
+    Area,
+    Building,
+    PlacedSolid,
+    Poles,
+    SideWay,
+    SiteDescription,
+    Slab,
+    Trees,
+    Wall,
+)
 from .intersections import enclosed, ring_roads
 from .levels import MIN_LEVEL_HEIGHT, UNNAMED_ROAD, Levels
 from .map_furniture import (
@@ -49,7 +61,6 @@ from .parts import Part
 from .place import SCENE_MARGIN, Place, shifted
 from .road_checks import road_warnings
 from .road_surface import Roadside, SurfaceLayers, without_crumbs
-from .roofs import house
 from .signal_posts import signal_parts, split_posts
 from .street_areas import MAX_MAPPED, NOTHING, Sidewalk, StreetAreas, street_areas
 from .street_map import JunctionArea, StreetMap
@@ -87,6 +98,9 @@ PART_NAMES = {group: (name,) for group, (name, _, _) in SURFACES.items()} | {
     "sidewalk": ("Pavements", "Pavements beyond", "Kerbs")
 }
 """Names of the parts whose widths are those of a group of lanes."""
+
+
+_Item = TypeVar("_Item", Area, Building, KeepOffArea, PlacedSolid, Poles, SideWay, Slab, Trees, Wall)
 
 
 @dataclass(frozen=True, eq=False)
@@ -234,7 +248,6 @@ def street_model(streets: StreetMap, description: SiteDescription) -> Generator[
         raise SeipError(f"map {road_map.name!r} has no lane with an area: give its lanes widths, or use another map")
     yield _step("place")
     # In map coordinates: the place, its level, and its region.
-    description, place_notes = in_metres(description, road_map, surfaces)
     place = Place(road_map, surfaces, description, streets.junctions)
     levels = place.levels()
     place = replace(place, surfaces=levels.studied)
@@ -277,7 +290,6 @@ def street_model(streets: StreetMap, description: SiteDescription) -> Generator[
         parts=tuple(_with_source(part, description) for part in parts if part.solid.faces),
         region=street.region,
         notes=(
-            *place_notes,
             *covered_notes,
             *_level_notes(levels),
             *clear_notes,
@@ -309,34 +321,23 @@ def _local_description(description: SiteDescription, street: _Surroundings) -> t
     """
     on_map = (shifted(area, street.origin) for area in (street.roadside.carriageway, street.roadside.mouths))
     cleared, notes = clear(description, *on_map)
-    plan = street.origin[:2]
-    local = replace(
-        cleared,
-        buildings=tuple(replace(one, outline=shifted(one.outline, -plan)) for one in cleared.buildings),
-        trees=tuple(replace(one, positions=one.positions - plan) for one in cleared.trees),
-        walls=tuple(replace(one, line=one.line - plan) for one in cleared.walls),
-        street_lights=tuple(replace(one, positions=one.positions - plan) for one in cleared.street_lights),
-        signal_poles=tuple(replace(one, positions=one.positions - plan) for one in cleared.signal_poles),
-        posts=tuple(replace(one, positions=one.positions - plan) for one in cleared.posts),
-        slabs=tuple(replace(one, outline=shifted(one.outline, -plan)) for one in cleared.slabs),
-        ways=tuple(_local_way(one, plan) for one in cleared.ways),
-        solids=tuple(_local_solid(one, street.origin) for one in cleared.solids),
-        forbidden_areas=tuple(replace(one, polygon=shifted(one.polygon, -plan)) for one in cleared.forbidden_areas),
-        mandatory_areas=tuple(replace(one, polygon=shifted(one.polygon, -plan)) for one in cleared.mandatory_areas),
-        keep_off_areas=tuple(replace(one, polygon=shifted(one.polygon, -plan)) for one in cleared.keep_off_areas),
-    )
-    return local, notes
+    local: dict[str, Any] = {
+        name: tuple(_local(one, street.origin) for one in getattr(cleared, name)) for name in PLACED_FIELDS
+    }
+    return replace(cleared, **local), notes
 
 
-def _local_way(way: SideWay, plan: Float) -> SideWay:
-    line = None if way.line is None else way.line - plan
-    return replace(way, area=shifted(way.area, -plan), line=line)
-
-
-def _local_solid(placed: PlacedSolid, origin: Float) -> PlacedSolid:
-    """Return a solid in local axes."""
-    solid = replace(placed.solid, vertices=placed.solid.vertices - origin)
-    return replace(placed, outline=shifted(placed.outline, -origin), solid=solid)
+def _local(item: _Item, origin: Float) -> _Item:
+    """Return an object or area of a description in local axes: all that is a shape or an array of places in it."""
+    moved: dict[str, Any] = {}
+    for name, value in vars(item).items():
+        if isinstance(value, BaseGeometry):
+            moved[name] = shifted(value, -origin)
+        elif isinstance(value, np.ndarray):
+            moved[name] = value - origin[: value.shape[1]]
+        elif isinstance(value, Solid):
+            moved[name] = replace(value, vertices=value.vertices - origin)
+    return replace(item, **moved)
 
 
 def _map_objects(streets: StreetMap, street: _Surroundings) -> tuple[PlacedObject, ...]:
@@ -875,7 +876,7 @@ def _described_parts(description: SiteDescription, street: _Surroundings) -> lis
     for slab in description.slabs:
         names[slab.name] += 1
         ground = float(street.terrain.height(shapely.get_coordinates(slab.outline)).min())
-        plate = house(slab.outline, ground + slab.base, ground + slab.top, side=slab.material)
+        plate = street_furniture.house(slab.outline, ground + slab.base, ground + slab.top, side=slab.material)
         parts.append(_with_item_source(Part(f"{slab.name} {names[slab.name]}", plate, (Role.OCCLUDERS,)), slab))
     trees = [(foot, row) for row in description.trees for foot in _on_ground(row.positions, street)]
     parts += [
@@ -889,12 +890,11 @@ def _described_parts(description: SiteDescription, street: _Surroundings) -> lis
 def _building_parts(building: Building, number: int, street: _Surroundings) -> list[Part]:
     plan = shapely.get_coordinates(building.outline.exterior)[:-1]
     ground = float(street.terrain.height(plan).min()) + building.base
-    walls = building.height - building.roof.height
     base = np.column_stack([plan, np.full(len(plan), ground)])
     shape = None
-    if building.roof.height > 0.0 or building.outline.interiors:
-        shape = house(building.outline, ground, ground + walls, side=facade(number), roof=building.roof)
-    made = building_parts(f"Building {number}", base, np.full(len(plan), walls), number, shape)
+    if building.outline.interiors:
+        shape = street_furniture.house(building.outline, ground, ground + building.height, side=facade(number))
+    made = building_parts(f"Building {number}", base, np.full(len(plan), building.height), number, shape)
     return [_with_item_source(part, building) for part in made]
 
 

@@ -18,7 +18,6 @@ from ..opendrive.road_map import Junction, RoadMap
 from . import road_surface
 from .approaches import approach_lanes
 from .description import DEFAULT_RADIUS, MAX_RADIUS, SiteDescription
-from .geographic_position import looks_like_degrees
 from .intersections import (
     JUNCTION_REACH,
     box_along,
@@ -241,8 +240,11 @@ class Place:
             where = f"in junction {description.junction!r}"
         elif description.region is not None:
             where = "within the region"
-        given = description.near is not None and not (x.is_integer() and y.is_integer())
-        hint = " (give metres of the map, not latitude and longitude)" if given and looks_like_degrees((x, y)) else ""
+        # Both numbers can be latitude and longitude, in either order.
+        as_degrees = (
+            max(abs(x), abs(y)) <= 180.0 and min(abs(x), abs(y)) <= 90.0 and not (x.is_integer() and y.is_integer())
+        )
+        hint = " (latitude and longitude are given by --near-latlon)" if description.near and as_degrees else ""
         return SeipError(f"there is no driving lane {where}{hint}{self._nearest()}")
 
     def _nearest(self) -> str:
