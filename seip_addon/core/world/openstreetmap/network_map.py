@@ -19,11 +19,10 @@ from ...arrays import Float
 from ...errors import SeipError
 from ...geometry.plan import beside, closed, travelled, united, without
 from ..opendrive.lanes import LaneSurface
-from ..opendrive.objects import PlacedObject
+from ..opendrive.objects import PlacedObject, PlacedSignal
 from ..opendrive.profile import ZERO_PROFILE, LateralShape, Profile
 from ..opendrive.reference_line import Clothoid, ReferenceLine
 from ..opendrive.road_map import Junction, Road, RoadLink, RoadMap
-from ..opendrive.signals import PlacedSignal
 from ..streetscape.intersections import SAME_DIRECTION
 from ..streetscape.named_places import CROSSING
 from ..streetscape.street_map import JunctionArea, Profiles, StreetMap
@@ -304,8 +303,6 @@ def _road(
         shape=LateralShape(np.empty(0), ()),
         lane_offset=ZERO_PROFILE,
         sections=(),
-        objects=(),
-        signals=(),
         predecessor=links[0],
         successor=links[1],
     )

@@ -31,7 +31,7 @@ from ..streetscape.place import SCENE_MARGIN
 from ..streetscape.street_map import StreetMap
 from ..streetscape.terrain import FlatLand
 from .extract import EARTH_RADIUS, MAX_LATITUDE, Extract, Node, Way, cropped, read_extract, window
-from .heights import StreetHeights, has_heights, street_heights
+from .heights import StreetHeights, street_heights
 from .mapped_crossings import guessed_crossings, with_mapped_crossings
 from .netconvert import convert
 from .network_map import NetworkMap, read_network_map
@@ -138,10 +138,7 @@ class ExtractSite:
         """Return the same site with its streets raised to the ground, onto bridges and into underpasses."""
         relief, road_map = self.description.relief, self.streets.road_map
         ground = None if relief is None else relief.rise
-        # An edge has the id of the way that it was made from, with a minus sign if it leads the opposite way.
-        sources = {road.id: road.id for road in road_map.roads}
-        lanes = road_surface.by_road(self.streets.lanes)
-        heights = street_heights(road_map, lanes, sources, self.source, self.shapes, ground)
+        heights = street_heights(road_map, self.source, self.shapes, ground)
         raised = replace(self, notes=(*self.notes, *heights.notes, *self._ramp_notes(heights)))
         is_raised = any(along_road.any() for _, along_road in heights.profiles.values())
         if is_raised:
@@ -150,7 +147,7 @@ class ExtractSite:
         if relief is not None:
             relief = replace(relief, bridges=heights.bridges)
             return replace(raised, description=replace(self.description, relief=relief))
-        if is_raised and not has_heights(road_map):
+        if is_raised and not self.source.elevated:
             land = FlatLand(0.0, heights.bridges)
             return replace(raised, description=replace(self.description, flat_land=land))
         return raised

@@ -165,7 +165,7 @@ def write_streets(
         lines += _way(number, way.nodes, _tags(way, medians, left_hand=left_hand))
     lines += _restrictions(extract, {number for number, _ in pieces})
     path.write_text(os.linesep.join([*lines, "</osm>", ""]), encoding="utf-8")
-    roundabouts = _joined(way.nodes for _, way in pieces if is_roundabout(way.tags))
+    roundabouts = joined(way.nodes for _, way in pieces if is_roundabout(way.tags))
     slip_ends = tuple(_slip_ends(extract, [way for _, way in pieces]))
     crossed = structures(extract, pieces, places)
     return StreetFile(
@@ -296,7 +296,7 @@ def _in_metres(extract: Extract, nodes: Sequence[Node]) -> Float:
     ).reshape(-1, 2)
 
 
-def _joined(ways: Iterable[tuple[int, ...]]) -> tuple[frozenset[int], ...]:
+def joined(ways: Iterable[tuple[int, ...]]) -> tuple[frozenset[int], ...]:
     """Return the node sets of connected groups of ways; ways that share a node belong to one group."""
     found: list[frozenset[int]] = []
     for nodes in ways:

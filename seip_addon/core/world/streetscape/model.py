@@ -22,8 +22,7 @@ from ...site.roles import AREA_OVERLAYS, Role
 from ...site.scene_geometry import ASSUMED, DESCRIBED, OTHER_LEVELS, NamedArea
 from ...site.sources import SourceCount, count_sources
 from ..opendrive.lanes import LaneSurface
-from ..opendrive.objects import PlacedObject, extent_in_plan
-from ..opendrive.signals import PlacedSignal
+from ..opendrive.objects import PlacedObject, PlacedSignal, extent_in_plan
 from . import road_surface, street_furniture
 from .clearing import MAX_IN_LANE, clear
 from .description import (

@@ -9,9 +9,7 @@ from hypothesis import strategies as st
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.world.opendrive.junctions import find_junction
-from seip_addon.core.world.opendrive.objects import placed_objects
 from seip_addon.core.world.opendrive.read import read_map
-from seip_addon.core.world.opendrive.signals import placed_signals
 from tests.builders.opendrive_text import document, geometry, lane, map_lanes, read_text, road, section
 from tests.oracles.random_cases import cases
 
@@ -165,7 +163,7 @@ def is_read_or_refused_in_words(folder, span, value):
     try:
         road_map = read_text(folder, text, "mutant.xodr")
         surfaces = map_lanes(road_map)
-        objects = (*placed_objects(road_map), *placed_signals(road_map))
+        objects = (*road_map.objects, *road_map.signals)
     except SeipError:
         return
     assert all(np.isfinite(surface.triangles).all() for surface in surfaces)
