@@ -8,6 +8,9 @@ from shapely.geometry.base import BaseGeometry
 
 from ...arrays import Float
 
+TUNNEL = "tunnel"
+"""Kind of the objects that stand for the tunnels of a map: lines along the road."""
+
 
 @dataclass(frozen=True, eq=False)
 class Outline:

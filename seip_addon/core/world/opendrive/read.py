@@ -66,7 +66,7 @@ def read_map(path: str | os.PathLike[str]) -> RoadMap:
         else np.zeros(4),
         geo_reference=((reference.element.text or "").strip() or None) if reference else None,
         roads=roads,
-        junctions=tuple(Junction(node.text("id"), node.text("name", "")) for node in root.children("junction")),
+        junctions=tuple(map(_junction, root.children("junction"))),
         objects=tuple(one for pair in zip(roads, nodes, strict=True) for one in read_objects(*pair)),
         signals=tuple(one for pair in zip(roads, nodes, strict=True) for one in read_signals(*pair)),
         attribution=tuple(
@@ -75,6 +75,11 @@ def read_map(path: str | os.PathLike[str]) -> RoadMap:
             if node.text("code", "") == ATTRIBUTION and node.text("value", "")
         ),
     )
+
+
+def _junction(node: Node) -> Junction:
+    kind = node.text("type", "")
+    return Junction(node.text("id"), node.text("name", ""), kind if kind in ("direct", "virtual") else "")
 
 
 def _road(node: Node) -> Road:

@@ -11,12 +11,13 @@ from ...arrays import Float
 from ...errors import SeipError
 from ...geometry.orientation import orientation
 from .document import Node
-from .objects import Outline, PlacedObject, PlacedSignal
+from .objects import TUNNEL, Outline, PlacedObject, PlacedSignal
 from .road_map import Road
 from .sampling import sample
 
 _MAX_COPIES = 10_000
 _STRIP_TOLERANCE = 0.02  # metres
+TUNNEL_STEP = 5.0  # metres along a tunnel
 _MAX_DISTANCE = limits.SITE_RADIUS.most  # metres that an object reaches, and stands from its road
 _MAX_HEIGHT = limits.ABOVE_GROUND.most
 
@@ -80,6 +81,8 @@ def read_objects(road: Road, node: Node) -> Iterator[PlacedObject]:
             yield _placed(item, item.own)
         for repeat in repeats:
             yield from _repeated(item, repeat)
+    for child in node.children("objects", "tunnel"):
+        yield _tunnel(road, child.within(f"tunnel {child.text('id', '')}"))
 
 
 def read_signals(road: Road, node: Node) -> Iterator[PlacedSignal]:
@@ -92,6 +95,15 @@ def read_signals(road: Road, node: Node) -> Iterator[PlacedSignal]:
         yaw = float(road.frame(s).heading[0]) + turned + item.number("hOffset", 0.0)
         number, name, kind = (item.text(key, "") for key in ("id", "name", "type"))
         yield PlacedSignal(road.id, number, name, kind, dynamic=item.flag("dynamic"), position=position, yaw=yaw)
+
+
+def _tunnel(road: Road, node: Node) -> PlacedObject:
+    """Return a tunnel as a line along the road."""
+    start, stop = np.clip(node.number("s") + np.array([0.0, node.number("length")]), 0.0, road.length)
+    along = np.linspace(start, stop, 2 + int((stop - start) / TUNNEL_STEP))
+    line = Outline(road.place(along, np.zeros(len(along))), np.zeros(len(along)), closed=False)
+    names = road.id, node.text("id", ""), node.text("name", ""), TUNNEL
+    return PlacedObject(*names, line.base.mean(axis=0), 0.0, 0.0, 0.0, float(stop - start), 0.0, 0.0, 0.0, (line,))
 
 
 def _object(road: Road, node: Node) -> _Object:

@@ -16,10 +16,11 @@ MIDDLE_STEP = 10.0  # metres along a road between the candidates for the middle 
 
 @dataclass(frozen=True)
 class Junction:
-    """A junction by its ``id`` and its ``name``, which may be empty."""
+    """A junction by its ``id`` and its ``name``, which may be empty; ``kind`` is ``direct`` or ``virtual``, or ""."""
 
     id: str
     name: str
+    kind: str = ""
 
 
 @dataclass(frozen=True, eq=False)

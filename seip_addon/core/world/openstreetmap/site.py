@@ -39,7 +39,7 @@ from .plan_shapes import PlanShapes
 from .signals import SIGNAL_REACH
 from .street_lanes import has_lane_count, has_widths, implausible_lanes, lane_counts, shares_lane, usual_lanes
 from .street_objects import surroundings
-from .streets import CLASSES, SHORT_PIECE, StreetFile, is_street, is_tunnel, shown_name, write_streets
+from .streets import CLASSES, SHORT_PIECE, StreetFile, is_street, shown_name, write_streets
 
 EXTRACT_SUFFIXES = (".osm", ".osm.gz", ".osm.xml", ".pbf")
 OTHER_SUFFIXES = (".json", ".geojson", ".osc", ".osc.gz", ".osm.bz2", ".osm.zip")
@@ -206,13 +206,11 @@ def site_of_extract(
     streets = with_mapped_crossings(network.streets, source, shapes)
     extent = _extent(streets, source, extract, near, place)
     stands_there = surroundings(shapes, extent.surroundings, extent.carriageway)
-    tunnels = _tunnels(extract, shapes, extent.seen, place.level)
-    _check_level(place.level, tunnels, streets.road_map)
     near_streets = [way for way in source.ways.values() if extent.seen.intersects(_path(shapes, way))]
     junction = extent.junction
     description = replace(
         stands_there,
-        name=_name(extract, streets, source, place, extent, in_tunnel=bool(tunnels)),
+        name=_name(extract, streets, source, place, extent),
         near=None if place.radius is None else (float(extent.middle[0]), float(extent.middle[1])),
         junction=junction.id if place.radius is None and junction is not None else None,
         radius=place.radius,
@@ -231,7 +229,6 @@ def site_of_extract(
         *_assumed_lanes(near_streets),
         *_lane_notes(near_streets, source.widened),
         *_implausible_lanes(near_streets),
-        *_tunnel_notes(tunnels),
         *_assumed_crossings(guessed_crossings(streets, extent.seen)),
         *(counted(number, *reason) for reason, number in shapes.dropped.items() if number),
         *_lone_signals([node for node in lone if extent.seen.intersects(shapely.Point(shapes.point(node)))]),
@@ -283,6 +280,8 @@ class _Extent:
         Nearest junction.
     away : float, metres
         Its distance.
+    together : frozenset of str
+        Ids of the junctions that form one intersection with it.
     roundabouts : tuple of frozenset of str
         Junction ids of each roundabout.
     seen : shapely geometry
@@ -297,6 +296,7 @@ class _Extent:
     middle: Float
     junction: Junction | None
     away: float
+    together: frozenset[str]
     roundabouts: tuple[frozenset[str], ...]
     seen: BaseGeometry
     surroundings: BaseGeometry
@@ -331,6 +331,7 @@ def _extent(
         middle,
         junction,
         away,
+        together,
         roundabouts,
         shapely.Point(middle).buffer(place.radius or size),
         shapely.Point(middle).buffer(reach + SCENE_MARGIN + STANDS_AROUND, quad_segs=16),
@@ -338,21 +339,9 @@ def _extent(
     )
 
 
-def _name(
-    extract: Extract,
-    streets: StreetMap,
-    source: StreetFile,
-    place: ExtractPlace,
-    extent: _Extent,
-    *,
-    in_tunnel: bool,
-) -> str:
+def _name(extract: Extract, streets: StreetMap, source: StreetFile, place: ExtractPlace, extent: _Extent) -> str:
     """Return the title of a place: the streets that were asked for, or those that meet there."""
-    names = [_spelt(extract, name) for name in place.streets]
-    if not names:
-        titled = replace(place, level=()) if in_tunnel else place
-        ranks = _ranks(source.ways.values())
-        names = _title(streets.road_map, streets.lanes, titled, extent.middle, extent.roundabouts, ranks)
+    names = [_spelt(extract, name) for name in place.streets] or _title(streets, source, place, extent)
     if names:
         return STREETS.join(names)
     latitude, longitude = extent.near
@@ -428,39 +417,6 @@ def _implausible_lanes(ways: Iterable[Way]) -> Iterator[str]:
             are = counted(lanes, "lane in all is", "lanes in all are")
             notes.append(f"the extract gives {name} {values}, which is not a plausible number of lanes: {are} assumed")
     yield from dict.fromkeys(notes)
-
-
-def _tunnels(extract: Extract, shapes: PlanShapes, seen: BaseGeometry, level: Sequence[str]) -> tuple[str, ...]:
-    """Return the names of streets of the level that lie in tunnels in an area, in the spelling of the extract."""
-    wanted = {name.strip().casefold() for name in level}
-    found = (
-        next(way.tags[key] for key in NAMES if way.tags.get(key, "").casefold() in wanted)
-        for way in extract.ways.values()
-        if is_tunnel(way.tags)
-        and wanted & {way.tags[key].casefold() for key in NAMES if key in way.tags}
-        and seen.intersects(_path(shapes, way))
-    )
-    return tuple(dict.fromkeys(found))
-
-
-def _check_level(level: Sequence[str], tunnels: Sequence[str], road_map: RoadMap) -> None:
-    """Raise an error if all streets of the level lie in tunnels."""
-    known = {text.casefold() for road in road_map.roads for text in (road.id, road.name)}
-    hidden = [name for name in tunnels if name.casefold() not in known]
-    if hidden and not any(name.strip().casefold() in known for name in level):
-        raise SeipError(
-            f"{hidden[0]} lies in a tunnel at this place, and scenes leave tunnels out: choose a street on the "
-            "surface with --level, or leave --level out"
-        )
-
-
-def _tunnel_notes(tunnels: Sequence[str]) -> Iterator[str]:
-    """Yield a note on streets of the level that lie in tunnels."""
-    for name in tunnels:
-        yield (
-            f"{name} lies in a tunnel at this place, and scenes leave tunnels out: the streets above are studied, "
-            f"and {name} only where it is in the open"
-        )
 
 
 def _assumed_crossings(number: int) -> Iterator[str]:
@@ -569,46 +525,33 @@ def _reach(lanes: Sequence[LaneSurface], junctions: Collection[str], middle: Flo
     return float(np.hypot(*np.concatenate([np.zeros((1, 2)), *corners]).T).max())
 
 
-def _title(
-    road_map: RoadMap,
-    lanes: Sequence[LaneSurface],
-    place: ExtractPlace,
-    middle: Float,
-    roundabouts: Sequence[frozenset[str]],
-    ranks: Mapping[str, int],
-) -> list[str]:
+def _title(streets: StreetMap, source: StreetFile, place: ExtractPlace, extent: _Extent) -> list[str]:
     """Return the names of up to two streets for the title of a place.
 
-    These are streets of the nearest junction. With a radius the junction must lie within it and, with a level, one of
-    the streets of the level must meet there. If there is no such junction, the streets of the level are used, or the
+    These are the streets of the nearest junction, if it lies within the radius; otherwise those of the level, or the
     nearest street.
     """
-    near = nearest_junctions(road_map, lanes, float(middle[0]), float(middle[1]), len(road_map.junctions))
+    road_map, lanes = streets.road_map, streets.lanes
+    radius = math.inf if place.radius is None else place.radius
     on_level = {name.strip().casefold() for name in place.level}
     level = list(dict.fromkeys(r.name for r in road_map.roads if on_level & {r.name.casefold(), r.id} and r.name))
-    for junction, away in near:
-        if place.radius is not None and away > place.radius:
-            break
-        together = intersection(lanes, junction.id, roundabouts)
-        meeting = _street_names(road_map, lanes, junction.id, together)
-        if place.radius is None or not level or set(level) & set(meeting):
-            return _crossing_pair(sorted(meeting, key=ranks.__getitem__), _headings(road_map, lanes, together))
+    junction = extent.junction
+    if junction is not None and extent.away <= radius:
+        meeting = streets_of_junctions(road_map, lanes)
+        numbers = sorted(extent.together, key=lambda number: (number != junction.id, number))
+        names = dict.fromkeys(name for number in numbers for name in meeting.get(number, ()))
+        if place.radius is None or not level or set(level) & set(names):
+            ranked = sorted(names, key=_ranks(source.ways.values()).__getitem__)
+            return _crossing_pair(ranked, _headings(road_map, lanes, extent.together))
     if level:
         return level[:2]
-    names = {road.id: road.name for road in road_map.roads}
-    driving = [lane for lane in road_surface.in_groups(lanes, ["driving"]) if names[lane.road_id]]
-    here = shapely.Point(middle)
+    called = {road.id: road.name for road in road_map.roads}
+    driving = [lane for lane in road_surface.in_groups(lanes, ["driving"]) if called[lane.road_id]]
+    here = shapely.Point(extent.middle)
     nearest = min(driving, key=lambda lane: float(lane.polygon.distance(here)), default=None)
-    return [] if nearest is None or nearest.polygon.distance(here) > (place.radius or 0.0) else [names[nearest.road_id]]
-
-
-def _street_names(
-    road_map: RoadMap, lanes: Sequence[LaneSurface], junction_id: str, together: Collection[str]
-) -> tuple[str, ...]:
-    """Return the names of the streets at a group of junctions that form one, those of the central junction first."""
-    meeting = streets_of_junctions(road_map, lanes)
-    numbers = sorted(together, key=lambda number: (number != junction_id, number))
-    return tuple(dict.fromkeys(name for number in numbers for name in meeting.get(number, ())))
+    return (
+        [] if nearest is None or nearest.polygon.distance(here) > (place.radius or 0.0) else [called[nearest.road_id]]
+    )
 
 
 def _ranks(ways: Iterable[Way]) -> defaultdict[str, int]:

@@ -110,11 +110,6 @@ def importance(tags: Tags) -> int:
     return 2 if highway in MAIN_CLASSES else int(highway == "tertiary")
 
 
-def is_tunnel(tags: Tags) -> bool:
-    """Return whether a way is a street in a tunnel; scenes leave tunnels out."""
-    return tags.get("highway") in CLASSES and _is_underground(tags)
-
-
 def _is_underground(tags: Tags) -> bool:
     return tags.get("tunnel", "no") not in ("no", "building_passage")
 

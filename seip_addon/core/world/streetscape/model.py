@@ -22,7 +22,7 @@ from ...site.roles import AREA_OVERLAYS, Role
 from ...site.scene_geometry import ASSUMED, DESCRIBED, OTHER_LEVELS, NamedArea
 from ...site.sources import SourceCount, count_sources
 from ..opendrive.lanes import LaneSurface
-from ..opendrive.objects import PlacedObject, PlacedSignal, extent_in_plan
+from ..opendrive.objects import TUNNEL, PlacedObject, PlacedSignal, extent_in_plan
 from . import road_surface, street_furniture
 from .clearing import MAX_IN_LANE, clear
 from .description import (
@@ -61,7 +61,7 @@ from .place import SCENE_MARGIN, Place, shifted
 from .road_checks import road_warnings
 from .road_surface import Roadside, SurfaceLayers, without_crumbs
 from .signal_posts import signal_parts, split_posts
-from .street_areas import MAX_MAPPED, NOTHING, Sidewalk, StreetAreas, street_areas
+from .street_areas import MAX_MAPPED, NOTHING, Sidewalk, StreetAreas, medians, street_areas
 from .street_map import JunctionArea, StreetMap
 from .terrain import Embankments, FlatLand, Relief, Terrain, cut, embankment_width
 
@@ -294,6 +294,7 @@ def street_model(streets: StreetMap, description: SiteDescription) -> Generator[
             *clear_notes,
             *surface.notes,
             *_furniture_notes(objects, furniture.signals),
+            *_tunnel_notes(objects, names),
         ),
         warnings=(*bare, *warnings),
         places=named_places(
@@ -443,6 +444,13 @@ def _furniture_notes(placed: Sequence[PlacedObject], signals: Sequence[Part]) ->
     if trunks:
         trees = counted(trunks, "tree")
         yield f"the map gives {trees} the width of a trunk: the crowns are taken as {CROWN_SHARE:g} times the height"
+
+
+def _tunnel_notes(placed: Sequence[PlacedObject], names: Mapping[str, str]) -> Iterator[str]:
+    for one in placed:
+        if one.kind == TUNNEL:
+            street = names.get(one.road_id) or f"road {one.road_id}"
+            yield f"tunnel {one.name or one.id} of {street} is built as an open road, without its walls and its roof"
 
 
 def _level_notes(levels: Levels) -> Iterator[str]:
@@ -851,6 +859,8 @@ def _keep_off_parts(
     Landings at the crossings of the map are added unless it was made from centre lines: netconvert guesses crossings.
     """
     areas = [(one.rule, one.polygon) for one in description.keep_off_areas]
+    if street.areas is not None:
+        areas.append(("islands", medians(street.roadside)))
     if not description.from_centre_lines:
         areas += [("landings", landing) for landing in landings(placed)]
     near = without(street.region.buffer(CANDIDATE_MARGIN), street.roadside.carriageway)

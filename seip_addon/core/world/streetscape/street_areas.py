@@ -130,7 +130,7 @@ def street_areas(
     lines = without(lines, carriageway.buffer(GAP))
     mapped = united(one.area for one in sidewalks if one.area.dwithin(carriageway, MAX_MAPPED))
     # What lies between carriageways or on an island of the street is no pavement unless it is mapped as one.
-    assumed = _wide(without(_filled(walked, carriageway), united([_towards(side, lines), _medians(side)])))
+    assumed = _wide(without(_filled(walked, carriageway), united([_towards(side, lines), medians(side)])))
     assumed = without_crumbs(assumed, least=MIN_ASSUMED) if len(sidewalks) else assumed
     pavement = without(united([assumed, _at_kerb(mapped, carriageway)]), carriageway)
     pavement = without(pavement, built_up)
@@ -150,7 +150,7 @@ def _carriageway(strips: Sequence[BaseGeometry], junctions: Sequence[JunctionAre
     return without_crumbs(united([whole, *islands]).simplify(TOLERANCE), least=MIN_ROAD_AREA)
 
 
-def _medians(side: Roadside) -> BaseGeometry:
+def medians(side: Roadside) -> BaseGeometry:
     """Return the islands and medians of a carriageway; small gaps are corners."""
     between = shapely.get_parts(without(side.filled, side.carriageway))
     return united(part for part in between if part.area >= MIN_ISLAND_AREA)

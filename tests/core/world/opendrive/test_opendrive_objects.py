@@ -103,3 +103,10 @@ def test_signals_have_a_place_and_a_direction(tmp_path):
     np.testing.assert_allclose(lamp.position, [*(30 * ahead + 2 * left), 12])
     assert lamp.yaw == pytest.approx(0.5 + math.pi)
     assert not lamp.dynamic
+
+
+def test_a_tunnel_is_a_line_along_its_road(tmp_path):
+    (tunnel,) = objects(tmp_path, '<tunnel id="9" name="Hill" s="20" length="30" type="standard"/>')
+    assert (tunnel.kind, tunnel.name, tunnel.length) == ("tunnel", "Hill", 30.0)
+    base = tunnel.outlines[0].base
+    assert np.hypot(*np.diff(base[[0, -1], :2], axis=0)[0]) == pytest.approx(30.0)

@@ -124,6 +124,17 @@ def test_a_junction_is_found_by_its_id_or_its_name(three_junctions):
     assert find_junction(*three_junctions, "North gate").id == "700"
 
 
+@pytest.mark.parametrize(
+    ("kind", "said"), [("direct", r"is a direct one.*--near 100 0"), ("default", "has no lanes; ")]
+)
+def test_of_a_junction_without_lanes_the_place_is_named(tmp_path, kind, said):
+    into = '<link><successor elementType="junction" elementId="5"/></link><planView>'
+    text = document(road().replace("<planView>", into), rest=f'<junction id="5" type="{kind}"/>')
+    road_map = read_text(tmp_path, text)
+    with pytest.raises(SeipError, match=said):
+        find_junction(road_map, map_lanes(road_map), "5")
+
+
 EVERYTHING = document(
     road(
         geometry('<poly3 a="0.1" b="0.1" c="0.001" d="-0.0001"/>', 30.0)
