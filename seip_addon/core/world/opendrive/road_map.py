@@ -8,7 +8,7 @@ import numpy as np
 
 from ...arrays import Float
 from .objects import PlacedObject, PlacedSignal
-from .profile import LateralShape, Profile
+from .profile import FLAT, ZERO_PROFILE, LateralShape, Profile
 from .reference_line import ReferenceLine
 
 MIDDLE_STEP = 10.0  # metres along a road between the candidates for the middle of a map
@@ -97,12 +97,12 @@ class Road:
     keeps_left: bool
     reference_line: ReferenceLine
     elevation: Profile
-    superelevation: Profile
-    left_crossfall: Profile
-    right_crossfall: Profile
-    shape: LateralShape
-    lane_offset: Profile
-    sections: tuple[LaneSection, ...]
+    superelevation: Profile = ZERO_PROFILE
+    left_crossfall: Profile = ZERO_PROFILE
+    right_crossfall: Profile = ZERO_PROFILE
+    shape: LateralShape = FLAT
+    lane_offset: Profile = ZERO_PROFILE
+    sections: tuple[LaneSection, ...] = ()
     predecessor: RoadLink | None = None
     successor: RoadLink | None = None
 

@@ -31,10 +31,8 @@ from ...geometry.plan import beside, travelled
 from ..opendrive.road_map import Road, RoadMap
 from ..streetscape.street_map import Profiles
 from .bridges import Crossing, corridors, half_width, lanes_of
-from .edge_lines import way_id
-from .extract import Way
 from .plan_shapes import PlanShapes
-from .streets import StreetFile, joined
+from .streets import StreetFile, is_link, joined, way_id
 
 STEP = 5.0  # metres along a street between places whose heights are computed, at most
 GRADE, LINK_GRADE = 0.06, 0.08
@@ -234,7 +232,7 @@ class _Graph:
         ways: dict[int, set[int]] = {}
         for number, nodes in self.nodes.items():
             # The lane on the inside of a bend is shorter than the line of the way, and so the steepest.
-            line, grade = self.line(number), LINK_GRADE if _is_link(self.streets.ways[number]) else GRADE
+            line, grade = self.line(number), LINK_GRADE if is_link(self.streets.ways[number].tags) else GRADE
             aside = (0.0, self.half(number), -self.half(number))
             steps = np.min([np.diff(travelled(beside(line, by))) for by in aside], axis=0)
             for one, other, length in zip(nodes[:-1].tolist(), nodes[1:].tolist(), steps.tolist(), strict=True):
@@ -248,10 +246,6 @@ class _Graph:
         for one, other in shapely.STRtree(points).query(points, "dwithin", distance=SAME_SURFACE).T.tolist():
             if one < other and ways[one].isdisjoint(ways[other]) and layers[one] == layers[other]:
                 self._limit(one, other, GRADE * float(np.hypot(*(self.xy[other] - self.xy[one]))))
-
-
-def _is_link(way: Way) -> bool:
-    return way.tags.get("highway", "").endswith("_link")
 
 
 def _leaving(line: Float, end: int) -> float:

@@ -115,8 +115,12 @@ def _extended(line: Float) -> Float:
 
 
 def _corridor(line: Float, tags: Tags) -> BaseGeometry:
-    width = metres(tags.get("width"), MAX_CROSSING_WIDTH) or CROSSING_WIDTH
-    return shapely.LineString(line).buffer(width / 2, cap_style="flat")
+    return shapely.LineString(line).buffer(crossing_width(tags) / 2, cap_style="flat")
+
+
+def crossing_width(tags: Tags) -> float:
+    """Return the width of a crossing along the street, metres."""
+    return metres(tags.get("width"), MAX_CROSSING_WIDTH) or CROSSING_WIDTH
 
 
 def _private_areas(shapes: PlanShapes, area: BaseGeometry) -> Iterator[BaseGeometry]:

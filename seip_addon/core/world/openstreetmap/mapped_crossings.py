@@ -18,10 +18,9 @@ from ..streetscape.named_places import ASSUMED_CROSSING
 from ..streetscape.road_surface import CARRIAGEWAY, MAX_SEAM, in_groups
 from ..streetscape.street_map import StreetMap
 from .extract import Extract
-from .keep_off import CROSSING_WIDTH, MAX_CROSSING_LENGTH, MAX_CROSSING_WIDTH
+from .keep_off import CROSSING_WIDTH, MAX_CROSSING_LENGTH, crossing_width
 from .network_map import crossing
 from .plan_shapes import PlanShapes
-from .quantities import metres
 from .streets import StreetFile
 
 MAPPED_AROUND = 40.0  # metres from a mapped crossing within which no crossing is guessed
@@ -105,11 +104,10 @@ def _crossing_nodes(extract: Extract) -> Iterator[tuple[int, float]]:
     """Yield the nodes that are crossings, and the extent of each along the street, metres."""
     for way in extract.ways.values():
         if "crossing" in (way.tags.get(key) for key in ("footway", "cycleway", "path")):
-            width = metres(way.tags.get("width"), MAX_CROSSING_WIDTH) or CROSSING_WIDTH
-            yield from ((number, width) for number in way.nodes)
+            yield from ((number, crossing_width(way.tags)) for number in way.nodes)
     for number, node in extract.nodes.items():
         if node.tags.get("highway") == "crossing" and node.tags.get("crossing") != "no":
-            yield number, metres(node.tags.get("width"), MAX_CROSSING_WIDTH) or CROSSING_WIDTH
+            yield number, crossing_width(node.tags)
 
 
 def _on_carriageway(crossed: _Crossed, lanes: Sequence[LaneSurface]) -> PlacedObject:

@@ -20,7 +20,7 @@ from ...errors import SeipError
 from ...geometry.plan import beside, closed, travelled, united, without
 from ..opendrive.lanes import LaneSurface
 from ..opendrive.objects import PlacedObject, PlacedSignal
-from ..opendrive.profile import ZERO_PROFILE, LateralShape, Profile
+from ..opendrive.profile import Profile
 from ..opendrive.reference_line import Clothoid, ReferenceLine
 from ..opendrive.road_map import Junction, Road, RoadLink, RoadMap
 from ..streetscape.intersections import SAME_DIRECTION
@@ -297,12 +297,6 @@ def _road(
         keeps_left=left_hand,
         reference_line=line,
         elevation=elevation,
-        superelevation=ZERO_PROFILE,
-        left_crossfall=ZERO_PROFILE,
-        right_crossfall=ZERO_PROFILE,
-        shape=LateralShape(np.empty(0), ()),
-        lane_offset=ZERO_PROFILE,
-        sections=(),
         predecessor=links[0],
         successor=links[1],
     )

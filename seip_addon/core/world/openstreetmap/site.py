@@ -30,6 +30,7 @@ from ..streetscape.named_places import street_names
 from ..streetscape.place import SCENE_MARGIN
 from ..streetscape.street_map import StreetMap
 from ..streetscape.terrain import FlatLand
+from .crossings import metres
 from .extract import EARTH_RADIUS, MAX_LATITUDE, Extract, Node, Way, cropped, read_extract, window
 from .heights import StreetHeights, street_heights
 from .mapped_crossings import guessed_crossings, with_mapped_crossings
@@ -621,7 +622,7 @@ def _meeting_place(extract: Extract, names: tuple[str, ...]) -> tuple[tuple[floa
     for node in (extract.nodes[number] for number in shared):
         # Single-linkage clustering: a node merges all groups that have a node near it. Dual carriageways that cross
         # share up to four nodes, which are one place.
-        met = [group for group in groups if any(_distance(node, other) < MAX_JUNCTION_DISTANCE for other in group)]
+        met = [group for group in groups if _away(node, group) < MAX_JUNCTION_DISTANCE]
         groups = [*(group for group in groups if group not in met), [node, *itertools.chain(*met)]]
     places = [
         (sum(node.latitude for node in group) / len(group), sum(node.longitude for node in group) / len(group))
@@ -637,11 +638,10 @@ def _meeting_place(extract: Extract, names: tuple[str, ...]) -> tuple[tuple[floa
     return places[0], (note,)
 
 
-def _distance(one: Node, other: Node) -> float:
-    """Return the distance between two nodes near each other, metres."""
-    north = math.radians(one.latitude - other.latitude)
-    east = math.radians(one.longitude - other.longitude) * math.cos(math.radians(one.latitude))
-    return EARTH_RADIUS * math.hypot(north, east)
+def _away(node: Node, others: Sequence[Node]) -> float:
+    """Return the distance from a node to the nearest of others, metres."""
+    places = metres([(other.latitude, other.longitude) for other in others], (node.latitude, node.longitude))
+    return float(np.hypot(*places.T).min())
 
 
 def _streets_called(extract: Extract, name: str) -> list[Way]:

@@ -12,6 +12,7 @@ import numpy as np
 import shapely
 
 from ...arrays import Float
+from ...geometry.tangent_plane import plan_metres
 from .bridges import Structures, structures
 from .extract import Extract, Node, Tags, Way, reversed_tags
 from .handedness import drives_on_the_left
@@ -271,9 +272,7 @@ def _slip_ends(extract: Extract, ways: Sequence[Way]) -> Iterator[int]:
             neighbours.setdefault(other, set()).add(one)
     meeting = [number for number, others in neighbours.items() if len(others) > 2]
     places = _in_metres(extract, [extract.nodes[number] for number in meeting])
-    links = {
-        end for way in ways if _is_link(way.tags) and is_one_way(way.tags) for end in (way.nodes[0], way.nodes[-1])
-    }
+    links = {end for way in ways if is_link(way.tags) and is_one_way(way.tags) for end in (way.nodes[0], way.nodes[-1])}
     for number, place in zip(meeting, places, strict=True):
         # The smallest distance is that of the node to itself, 0; the second smallest is to the nearest other junction.
         if number in links and np.sort(np.hypot(*(places - place).T))[1:2].min(initial=math.inf) > JOIN_DISTANCE:
@@ -282,13 +281,9 @@ def _slip_ends(extract: Extract, ways: Sequence[Way]) -> Iterator[int]:
 
 def _in_metres(extract: Extract, nodes: Sequence[Node]) -> Float:
     """Return the positions of nodes (n, 2), metres east and north of the extract's first node."""
+    degrees = np.array([(node.latitude, node.longitude) for node in nodes], dtype=np.float64).reshape(-1, 2)
     first = next(iter(extract.nodes.values()))
-    # Equirectangular approximation with the length of a degree at the equator. It serves comparisons of distances,
-    # sides and crossings among neighbours only; netconvert projects the coordinates of the map itself.
-    east = 111_320.0 * math.cos(math.radians(first.latitude))
-    return np.array(
-        [((node.longitude - first.longitude) * east, (node.latitude - first.latitude) * 110_574.0) for node in nodes]
-    ).reshape(-1, 2)
+    return plan_metres(degrees, np.array([first.latitude, first.longitude]))
 
 
 def joined(ways: Iterable[tuple[int, ...]]) -> tuple[frozenset[int], ...]:
@@ -369,6 +364,12 @@ def _way(number: int, nodes: Iterable[int], tags: Mapping[str, str]) -> list[str
 
 def _tag_lines(tags: Mapping[str, str]) -> list[str]:
     return [f"<tag k={quoteattr(key)} v={quoteattr(value)}/>" for key, value in tags.items()]
+
+
+def way_id(name: str) -> int:
+    """Return the id of the way that an edge of netconvert, such as ``-12#3``, was made from; 0 if it has none."""
+    digits = "".join(itertools.takewhile(str.isdigit, name.removeprefix("-")))
+    return int(digits) if digits else 0
 
 
 def _restrictions(extract: Extract, streets: set[int]) -> Iterator[str]:
@@ -473,7 +474,7 @@ class _Medians:
         # Roundabouts and slip roads lie next to streets too, but are not the other carriageway of one.
         starts, stops, names = [], [], []
         for way in ways:
-            if is_one_way(way.tags) and way.tags.get("junction") is None and not _is_link(way.tags):
+            if is_one_way(way.tags) and way.tags.get("junction") is None and not is_link(way.tags):
                 line = self._line(way)
                 starts.append(line[:-1])
                 stops.append(line[1:])
@@ -512,5 +513,6 @@ class _Medians:
         return _in_metres(self._extract, self._extract.line(way))
 
 
-def _is_link(tags: Tags) -> bool:
+def is_link(tags: Tags) -> bool:
+    """Return whether a street is a slip road or a ramp."""
     return tags.get("highway", "").endswith("_link")
