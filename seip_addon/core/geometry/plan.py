@@ -63,6 +63,11 @@ def closed(area: BaseGeometry, gap: float, join: Literal["mitre", "round"] = "mi
     return _without_twins(wider).buffer(-gap, join_style=join)
 
 
+def opened(area: BaseGeometry, width: float) -> BaseGeometry:
+    """Return an area in plan without parts narrower than ``width`` metres; corners of more than 23 degrees stay."""
+    return area.buffer(-width / 2, join_style="mitre").buffer(width / 2, join_style="mitre")  # morphological opening
+
+
 def _without_twins(area: BaseGeometry) -> BaseGeometry:
     """Return an area with distinct corners: unions leave some that differ only by rounding.
 

@@ -17,7 +17,7 @@ from shapely.geometry.base import BaseGeometry
 
 from ...arrays import Float
 from ...errors import SeipError
-from ...geometry.plan import beside, closed, travelled, united, without
+from ...geometry.plan import beside, closed, opened, travelled, united, without
 from ..opendrive.lanes import LaneSurface
 from ..opendrive.objects import PlacedObject, PlacedSignal
 from ..opendrive.profile import Profile
@@ -41,7 +41,7 @@ PRECISION = 3  # decimal places of coordinates, metres
 MIN_ARMS = 3  # arms of a junction; where fewer meet, a street continues
 ARM_GAP = 2.0  # metres between two ends of carriageways of one arm at most
 MAX_MERGING = 4  # ends of edges where the directions of one street divide: two of each direction
-SLIVER = 0.3  # metres: parts of a junction up to twice this wide between its pavements are no carriageway
+SLIVER = 0.6  # metres: narrower parts of a junction between its pavements are no carriageway
 CORNER = 2.0  # metres that the carriageway of a junction extends beyond the lanes through it, at most
 BIKE_LANE = 0.75  # half the width of a cycle lane, metres: between lanes through a junction
 MIN_LENGTH = 0.1  # metres: shorter lanes within junctions have no direction
@@ -337,8 +337,7 @@ def _driven_area(area: BaseGeometry, lanes: BaseGeometry) -> BaseGeometry:
     Pavements of edges shorter than the junction reach into it, and some between wide angles lie beyond it: the
     carriageway is where vehicles drive, and a little more at corners where none turns.
     """
-    # Morphological opening: where a pavement does not quite reach the outline of the junction, slivers are left.
-    area = area.buffer(-SLIVER, join_style="mitre").buffer(SLIVER, join_style="mitre")
+    area = opened(area, SLIVER)  # where a pavement does not quite reach the outline of the junction
     if lanes.is_empty:
         return area
     filled = united(shapely.Polygon(part.exterior) for part in shapely.get_parts(closed(lanes, BIKE_LANE)))

@@ -10,7 +10,7 @@ from shapely.geometry.base import BaseGeometry
 
 from ...arrays import Float
 from ...errors import SeipError
-from ...geometry.plan import closed, united
+from ...geometry.plan import closed, opened, united
 from ...site.scene_geometry import DEFAULT_WEIGHT
 from ..opendrive.junctions import find_junction, junction_area, nearest_junctions
 from ..opendrive.lanes import LaneSurface
@@ -29,7 +29,7 @@ from .intersections import (
 from .levels import Levels, split_levels
 from .named_places import street_names
 from .street_areas import GAP as JUNCTION_GAP
-from .street_areas import MIN_ISLAND_AREA, TOLERANCE, tapers
+from .street_areas import MIN_ISLAND_AREA, SPIKE, TOLERANCE, tapers
 from .street_map import JunctionArea
 
 MIN_SHARE_OF_JUNCTION = 0.5  # share of a junction's area in a region from which on the region includes all of it
@@ -156,7 +156,7 @@ class Place:
         # Mitred corners of the closing that lie outside the road are no part of it.
         road = united([*(lane.polygon for lane in nearby), *junctions, *widened]).buffer(JUNCTION_GAP / 2)
         whole = closed(whole.simplify(TOLERANCE), JUNCTION_GAP).intersection(road)
-        return road_surface.without_crumbs(whole, least=MIN_ISLAND_AREA)
+        return road_surface.without_crumbs(opened(whole, SPIKE), least=MIN_ISLAND_AREA)
 
     def weighted_areas(self) -> list[tuple[str, BaseGeometry, float]]:
         """Return name, area and weight of the weighted regions.
