@@ -12,10 +12,10 @@ from ...arrays import Boolean, Float
 from ...errors import SeipError
 from ...geometry.tangent_plane import plan_metres
 from ..opendrive.junctions import STREETS
-from .extract import Extract, Tags, rings
+from .extract import Extract, Tags
 from .signals import SIGNAL_REACH
 from .street_lanes import is_roundabout
-from .streets import CLASSES, importance, is_street
+from .streets import CLASSES, importance, is_street, joined
 
 ONE_CROSSING = 60.0  # metres: nodes of the same streets within this distance are one crossing (dual carriageways)
 CLASS_RULES = tuple(kind for kind in CLASSES if not kind.endswith("_link"))
@@ -55,7 +55,7 @@ def named_crossings(extract: Extract) -> tuple[Crossing, ...]:
     """Return the crossings of an extract's named streets, sorted by name; a roundabout is one crossing."""
     streets = [way for way in extract.ways.values() if "highway" in way.tags and is_street(way.tags)]
     round_ways = [way for way in streets if is_roundabout(way.tags)]
-    ring_of = {node: number for number, ring in enumerate(rings(round_ways)[0]) for node in ring}
+    ring_of = {node: number for number, ring in enumerate(joined(way.nodes for way in round_ways)) for node in ring}
     names: defaultdict[tuple[str, int], dict[str, int]] = defaultdict(dict)  # importance of each street of a place
     nodes: defaultdict[tuple[str, int], set[int]] = defaultdict(set)
     for way in streets:

@@ -12,7 +12,7 @@ from seip_addon.core.geometry.geo_reference import projection
 from seip_addon.core.progress import finish
 from seip_addon.core.world.openstreetmap.buildings import USUAL_HEIGHT
 from seip_addon.core.world.openstreetmap.extract import read_extract
-from seip_addon.core.world.openstreetmap.plan_shapes import DRAWN_TWICE, PlanShapes
+from seip_addon.core.world.openstreetmap.plan_shapes import DRAWN_TWICE, PIECES, PlanShapes
 from seip_addon.core.world.openstreetmap.street_objects import surroundings
 from tests.builders.osm_text import Extract
 
@@ -114,6 +114,23 @@ def test_a_relation_has_courtyards_and_its_ways_count_once(tmp_path, tagged):
     assert building.outline.area == pytest.approx(1200, rel=0.01)
     assert len(building.outline.interiors) == 1
     assert building.height == 9
+
+
+def test_ways_are_joined_to_rings_in_either_direction(tmp_path):
+    extract = Extract()
+    lines = [[(0, 20), (40, 20), (40, 60)], [(0, 60), (20, 70), (40, 60)], [(0, 60), (0, 20)], [(70, 20), (80, 20)]]
+    members = [("way", extract.way(line), "outer") for line in lines]
+    extract.relation(members, type="multipolygon", building="yes")
+    site, shapes = found(extract, tmp_path)
+    assert site.buildings[0].outline.area == pytest.approx(40 * 40 + 40 * 10 / 2, rel=0.01)
+    assert shapes.dropped[PIECES] == 1
+
+
+def test_a_relation_that_the_extract_cuts_off_is_closed_by_a_straight_line(tmp_path):
+    extract = Extract()
+    ways = [extract.way(line) for line in ([(0, 20), (40, 20), (40, 60)], [(40, 60), (20, 70), 999_999, (0, 20)])]
+    extract.relation([("way", way, "outer") for way in ways], type="multipolygon", building="yes")
+    assert found(extract, tmp_path)[0].buildings[0].outline.area == pytest.approx(1400, rel=0.1)
 
 
 @pytest.mark.parametrize(("kind", "width"), [("footway", 2.0), ("service", 3.5), ("cycleway", 2.0)])
