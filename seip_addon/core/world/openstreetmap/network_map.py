@@ -25,6 +25,7 @@ from ..opendrive.reference_line import Clothoid, ReferenceLine
 from ..opendrive.road_map import Junction, Road, RoadLink, RoadMap
 from ..streetscape.intersections import SAME_DIRECTION
 from ..streetscape.named_places import CROSSING
+from ..streetscape.road_surface import CARRIAGEWAY, in_groups
 from ..streetscape.street_map import JunctionArea, Profiles, StreetMap
 from ..traffic_simulation.street_network import (
     LANE_WIDTH,
@@ -38,6 +39,9 @@ from ..traffic_simulation.street_network import (
 _LANE = re.compile(r'(<lane id=")([^"]*)("[^>]*? shape=")([^"]*)"')
 _Areas = defaultdict[str, list[BaseGeometry]]
 PRECISION = 3  # decimal places of coordinates, metres
+WALK_STEP = 2.0  # metres between the points of a pavement that is moved to a mapped sidewalk
+MAX_WALK_SHIFT = 8.0  # metres by which it is moved at most
+MIN_WALKED = 0.5  # share of it along which the sidewalk must run
 MIN_ARMS = 3  # arms of a junction; where fewer meet, a street continues
 ARM_GAP = 2.0  # metres between two ends of carriageways of one arm at most
 MAX_MERGING = 4  # ends of edges where the directions of one street divide: two of each direction
@@ -93,11 +97,59 @@ class NetworkMap:
             shares = np.unique(np.concatenate([own, bends[(bends > 0.0) & (bends < 1.0)]]))
             x, y = (np.interp(shares, own, line[:, axis]) for axis in (0, 1))
             z = np.interp((low + (high - low) * shares) * along[-1], along, heights)
-            rows = np.column_stack([x, y, z]).tolist()
-            shape = " ".join(",".join(f"{value:.{PRECISION}f}" for value in row) for row in rows)
-            return f'{match[1]}{match[2]}{match[3]}{shape}"'
+            return f'{match[1]}{match[2]}{match[3]}{_shape(np.column_stack([x, y, z]))}"'
 
         return _LANE.sub(raised, self.text)
+
+    def walking_on(self, sidewalks: BaseGeometry) -> "NetworkMap":
+        """Return the network with its pavements moved to mapped sidewalks along them, given as lines.
+
+        A mapped sidewalk within the carriageway says no more than that the pavement is narrow.
+        """
+        about = sidewalks.buffer(MAX_WALK_SHIFT)
+        shapely.prepare(about)
+        areas = [lane.polygon for lane in in_groups(self.streets.lanes, CARRIAGEWAY)]
+        areas += [one.carriageway for one in self.streets.junctions]
+        carriageway = united(area for area in areas if about.intersects(area))
+        shapely.prepare(carriageway)
+        mapped = without(sidewalks, carriageway.buffer(WALK_STEP / 2))
+
+        def moved(match: re.Match[str]) -> str:
+            if match[2].startswith(":") or ' allow="pedestrian"' not in match[3]:
+                return match[0]
+            line = _moved_walk(shape_points(match[4]), mapped, carriageway)
+            if line is None or carriageway.intersects(shapely.LineString(line)):
+                return match[0]
+            return f'{match[1]}{match[2]}{match[3]}{_shape(line)}" customShape="1"'
+
+        return self if mapped.is_empty else replace(self, text=_LANE.sub(moved, self.text))
+
+
+def _moved_walk(line: Float, mapped: BaseGeometry, carriageway: BaseGeometry) -> Float | None:
+    """Return the line of a pavement (n, 3), moved sideways to mapped sidewalks; None if none runs along most of it."""
+    places: Float = shapely.get_coordinates(shapely.segmentize(shapely.LineString(line), WALK_STEP), include_z=True)
+    if len(places) < 2:
+        return None
+    plan = places[:, :2]
+    ways = shapely.shortest_line(shapely.points(plan), mapped)
+    aside = shapely.get_coordinates(ways)[1::2] - plan
+    along = np.gradient(plan, axis=0)
+    along /= np.maximum(np.hypot(*along.T), MIN_STEP)[:, None]
+    # Beyond the end of a mapped sidewalk, the way to it leads along the street: there the line keeps its distance.
+    known = (np.hypot(*aside.T) < MAX_WALK_SHIFT) & (np.abs((aside * along).sum(axis=1)) < WALK_STEP / 2)
+    known &= ~shapely.intersects(carriageway, ways)
+    if known.mean() < MIN_WALKED:
+        return None
+    left = (aside * np.column_stack([-along[:, 1], along[:, 0]])).sum(axis=1)
+    by = np.interp(np.arange(len(plan)), np.flatnonzero(known), left[known])
+    places[:, :2] += by[:, None] * np.column_stack([-along[:, 1], along[:, 0]])
+    return places
+
+
+def _shape(line: Float) -> str:
+    """Return the text of a line (n, 3), without heights if all are zero."""
+    rows = (line if line[:, 2].any() else line[:, :2]).tolist()
+    return " ".join(",".join(f"{value:.{PRECISION}f}" for value in row) for row in rows)
 
 
 def credited(text: str, attribution: Iterable[str]) -> str:

@@ -224,6 +224,8 @@ def site_of_extract(
         *(counted(number, *reason) for reason, number in shapes.dropped.items() if number),
         *lone_signals([node for node in lone if extent.seen.intersects(shapely.Point(shapes.point(node)))]),
     )
+    sidewalks = shapely.MultiLineString([way.line for way in description.ways if way.line is not None])
+    network = network.walking_on(sidewalks)
     return ExtractSite(streets, network, network.text, description, notes, source, shapes, extent.seen)
 
 

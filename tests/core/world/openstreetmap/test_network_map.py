@@ -6,6 +6,7 @@ import shapely
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.world.openstreetmap.network_map import credited, read_network_map
+from seip_addon.core.world.traffic_simulation.street_network import read_network
 
 NETWORK = """<net version="1.20"{left}>
 <location netOffset="-391000.00,-5817000.00" convBoundary="0,0,1,1" origBoundary="0,0,1,1" projParameter="+proj=utm"/>
@@ -112,6 +113,27 @@ def test_raised_streets_and_their_file_agree(tmp_path):
     assert np.interp([40.0, 69.0], again["2"].s, again["2"].right[:, 2]) == pytest.approx([2.0, 2.5])
     assert again[":b_1"].left[[0, -1], 2] == pytest.approx([3.0, 4.0])
     assert not again["3"].left[:, 2].any()
+
+
+@pytest.mark.parametrize(
+    ("line", "y"),
+    [
+        ([(0, -8), (99, -8)], -8.0),
+        ([(30, -7), (80, -7)], -7.0),
+        ([(0, -2), (99, -2)], -4.45),  # in the carriageway
+        ([(0, 2), (99, 2)], -4.45),  # on the other side of it
+        ([(0, -8), (20, -8)], -4.45),  # along a short part of the street only
+    ],
+)
+def test_people_walk_on_a_mapped_sidewalk(tmp_path, line, y):
+    network = read(tmp_path).walking_on(shapely.MultiLineString([line]))
+    path = tmp_path / "walked.net.xml"
+    path.write_text(network.text, encoding="utf-8")
+    walked = read_network(path)
+    assert walked.lane("2_0").line[:, 1] == pytest.approx(y)
+    assert walked.lane("2_0").line[[0, -1], 0] == pytest.approx([0.0, 98.0])
+    assert walked.lane("3_0").line[:, 1] == pytest.approx(-4.45)
+    assert walked.lane("2_1").line[:, 1] == pytest.approx(-1.6)
 
 
 def test_credits_are_comments_that_xml_allows(tmp_path):
