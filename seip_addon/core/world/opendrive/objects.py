@@ -1,4 +1,4 @@
-"""Objects and signals of a map in map coordinates."""
+"""Objects and signals of a map in map coordinates; `tests/core/world/opendrive/test_opendrive_objects.py` has some."""
 
 from dataclasses import dataclass
 

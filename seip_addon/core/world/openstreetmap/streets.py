@@ -1,4 +1,7 @@
-"""Streets of an extract for SUMO's netconvert: selection of ways, with explicit lanes, widths and pavements."""
+"""Streets of an extract for SUMO's netconvert: selection of ways, with explicit lanes, widths and pavements.
+
+Its use is shown in `tests/core/world/openstreetmap/test_streets.py`.
+"""
 
 import itertools
 import math
