@@ -85,7 +85,7 @@ def no_folder(scene: bpy.types.Scene) -> str:
 
 
 class SEIP_OT_look_from_sensor(ForPlacement, bpy.types.Operator):
-    """Set the view to the eye of the sensor that is active in the list, towards the road"""
+    """Look from the sensor that is active in the list towards the road"""
 
     bl_idname = "seip.look_from_sensor"
     bl_label = "View from Sensor"
@@ -125,7 +125,7 @@ class SEIP_OT_keep_placement(ForPlacement, bpy.types.Operator):
     bl_label = "Keep Placement"
     bl_options = {"REGISTER", "UNDO"}
 
-    name: bpy.props.StringProperty(name="Name", description="Under which it is kept; empty for a number")
+    name: bpy.props.StringProperty(name="Name", description="Name of the kept placement; numbered if empty")
 
     @classmethod
     def why_not(cls, context: bpy.types.Context) -> str:
@@ -155,7 +155,7 @@ def _free_name(taken: set[str]) -> str:
 
 
 class SEIP_OT_drop_placement(bpy.types.Operator):
-    """Forget the kept placement that is active in the list"""
+    """Remove the kept placement that is active in the list"""
 
     bl_idname = "seip.drop_placement"
     bl_label = "Remove Kept Placement"
@@ -176,7 +176,7 @@ class SEIP_OT_drop_placement(bpy.types.Operator):
 
 
 class SEIP_OT_show_comparison(ForPlacement, bpy.types.Operator):
-    """Colour the road by which of the two placements see it: both, only the kept, only the present or neither"""
+    """Colour the road by the placements that see it: both, only the kept one, only the present one or neither"""
 
     bl_idname = "seip.show_comparison"
     bl_label = "Show Difference"
@@ -208,7 +208,7 @@ class SEIP_OT_show_comparison(ForPlacement, bpy.types.Operator):
 
 
 class SEIP_OT_follow_sensors(ForPlacement, LongWork[tuple[SceneState, VisibilityModel]], bpy.types.Operator):
-    """Show the coverage change while sensors are moved or turned by hand; press again to end it"""
+    """Toggle live coverage while sensors are moved or turned by hand"""
 
     bl_idname = "seip.follow_sensors"
     bl_label = "Follow Moved Sensors"
@@ -246,7 +246,7 @@ def _set_up(
 
 
 class SEIP_OT_evaluate_sensors(ForPlacement, LongWork[SceneState], bpy.types.Operator):
-    """Evaluate the sensors where they are now, moved, deleted and added by hand, and make them the placement"""
+    """Evaluate the sensors of the scene at their present poses, and make them the placement"""
 
     bl_idname = "seip.evaluate_sensors"
     bl_label = "Evaluate Moved Sensors"
@@ -320,7 +320,7 @@ def _checked_folder(scene: bpy.types.Scene) -> Path:
 
 
 class SEIP_OT_export_result(_Writes[SceneState], bpy.types.Operator):
-    """Write tables, pictures and the scene with its sensors to the folder, in place of earlier ones"""
+    """Write tables, pictures and the scene with its sensors to the folder, replacing earlier ones"""
 
     bl_idname = "seip.export_result"
     bl_label = "Export"
@@ -365,7 +365,7 @@ def _exported(folder: Path, scene: bpy.types.Scene) -> Generator[Progress, None,
 
 
 class SEIP_OT_write_report(_Writes[tuple[SceneState, tuple[Path, ...]]], bpy.types.Operator):
-    """Write a report on the placement into the folder, a page of HTML and a PDF, and export the placement if it is not there yet"""  # noqa: E501  # a tooltip is one line
+    """Write a report on the placement to the folder, as HTML and PDF; export the placement first if needed"""
 
     bl_idname = "seip.write_report"
     bl_label = "Write Report"

@@ -211,8 +211,8 @@ def _of_extract(source: Path, request: SiteRequest, map_path: Path | None) -> Ge
     if len(request.junction) == 1:
         raise SeipError(f'a junction of {source.name} needs two streets: give --junction "One Street" "Other Street"')
     with tempfile.TemporaryDirectory() as folder:
-        map_path = Path(folder) / "streets.net.xml"
-        site = yield from site_of_extract(source, request.extract_place, map_path, request.sumo)
+        network = Path(folder) / "streets.net.xml"
+        site = yield from site_of_extract(source, request.extract_place, network, request.sumo)
     found = site.description
     _, described = describe_place(source, site=request.site)
     description = replace(
