@@ -42,20 +42,38 @@ def convert(
     programs = find_sumo(sumo)
     if programs.home is None:
         raise SeipError("SUMO's data files were not found near its programs: set SUMO_HOME to the folder with them")
-    types = ",".join(str(programs.home / "data" / "typemap" / name) for name in TYPE_FILES)
     first, lines = (target.with_name(f"{target.name}.{kind}.xml") for kind in ("first", "edg"))
-    common = [
+    common: list[object] = [
         *("--no-turnarounds", "--output.street-names"),
         *("--no-warnings", "--xml-validation", "never", "--aggregate-warnings", 1),
+        *["--lefthand"] * streets.left_hand,
     ]
+    types = ",".join(str(programs.home / "data" / "typemap" / name) for name in TYPE_FILES)
+    options = ["--osm-files", source, "--output-file", first, "--type-files", types, *_layout(streets), *common]
+    yield from run(programs, programs.netconvert, options, "streets of the extract")
+    # Lanes move to their places in a second run, with the junctions of the first: which nodes netconvert joins to one
+    # junction depends on the shapes of the edges between them.
+    moved = _moved_edges(read_network(first), streets.ways)
+    lines.write_text("\n".join(["<edges>", *moved, "</edges>", ""]), encoding="utf-8")
+    options = ["--sumo-net-file", first, "--edge-files", lines, "--output-file", target, "--precision", PRECISION]
+    options += [*common, "--crossings.guess", "--junctions.corner-detail", 5]
+    yield from run(programs, programs.netconvert, options, "lanes of the extract")
+    first.unlink()
+    lines.unlink()
+    # The first comment holds the time of the run and the paths of its files. With it the same streets would give
+    # different bytes each time, and results that carry a digest of the map would be stale.
+    text = target.read_text(encoding="utf-8")
+    target.write_text(re.sub(r"<!--.*?-->\s*", "", text, count=1, flags=re.DOTALL), encoding="utf-8")
+
+
+def _layout(streets: StreetFile) -> list[object]:
+    """Return the options by which streets are laid out."""
     options: list[object] = [
-        *("--osm-files", source, "--output-file", first, "--precision", 6, "--type-files", types),
-        *("--geometry.remove", "--ramps.guess", "--junctions.join", "--junctions.join-dist", JOIN_DISTANCE),
+        *("--precision", 6, "--geometry.remove", "--ramps.guess"),
+        *("--junctions.join", "--junctions.join-dist", JOIN_DISTANCE),
         *("--tls.guess-signals", "--tls.discard-simple", "--tls.join"),
-        *("--osm.sidewalks", "--default.sidewalk-width", SIDEWALK_WIDTH, *common),
+        *("--osm.sidewalks", "--default.sidewalk-width", SIDEWALK_WIDTH),
     ]
-    if streets.left_hand:
-        options += ["--lefthand"]
     # netconvert would join the ends of slip lanes of any length, and the ends of bridges with junctions below them
     apart = sorted(streets.structures.ends.union(streets.slip_ends, *streets.roundabouts))
     if apart:
@@ -73,20 +91,7 @@ def convert(
     ]
     if kept:
         options += ["--geometry.remove.keep-edges.explicit", ",".join(kept)]
-    yield from run(programs, programs.netconvert, options, "streets of the extract")
-    # Lanes move to their places in a second run, with the junctions of the first: which nodes netconvert joins to one
-    # junction depends on the shapes of the edges between them.
-    moved = _moved_edges(read_network(first), streets.ways)
-    lines.write_text("\n".join(["<edges>", *moved, "</edges>", ""]), encoding="utf-8")
-    options = ["--sumo-net-file", first, "--edge-files", lines, "--output-file", target, "--precision", PRECISION]
-    options += [*common, "--crossings.guess", "--junctions.corner-detail", 5, *["--lefthand"] * streets.left_hand]
-    yield from run(programs, programs.netconvert, options, "lanes of the extract")
-    first.unlink()
-    lines.unlink()
-    # The first comment holds the time of the run and the paths of its files. With it the same streets would give
-    # different bytes each time, and results that carry a digest of the map would be stale.
-    text = target.read_text(encoding="utf-8")
-    target.write_text(re.sub(r"<!--.*?-->\s*", "", text, count=1, flags=re.DOTALL), encoding="utf-8")
+    return options
 
 
 def _moved_edges(network: StreetNetwork, ways: Mapping[int, Way]) -> Iterator[str]:

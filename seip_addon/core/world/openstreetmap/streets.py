@@ -200,38 +200,37 @@ def _with_lanes_of_neighbours(extract: Extract, *, service: bool) -> Extract:
         way = streets[number]
         return [other for other in at[end] if other != number and _continues(way, streets[other], end)]
 
-    ends = {
+    short = {
         number: [onward(number, end) for end in (way.nodes[0], way.nodes[-1])]
         for number, way in streets.items()
         if not has_lane_count(way.tags) and not implausible_lanes(way.tags) and _is_short(extract, way)
     }
+
+    def leads_on(side: Sequence[int]) -> bool:
+        return any(one in short or has_lane_count(streets[one].tags) for one in side)
+
     # A chain of short pieces counts if both of its ends lead on to pieces with lanes.
-    left: set[int] | None = None
-    while left is None or left:
-        left = {
-            number
-            for number, around in ends.items()
-            if not all(any(one in ends or has_lane_count(streets[one].tags) for one in side) for side in around)
-        }
-        ends = {number: around for number, around in ends.items() if number not in left}
-    while ends:
-        given = {
-            number: [
-                _lanes_along(streets[number], streets[other])
-                for other in itertools.chain(*around)
-                if has_lane_count(streets[other].tags)
-            ]
-            for number, around in ends.items()
-        }
-        # The wider neighbour: a lane too many is a taper, and one too few is a post in a lane.
-        for number, options in given.items():
-            if options:
-                widest = max(options, key=lambda tags: sum(lane_counts(tags).values()))
-                streets[number] = replace(streets[number], tags={**widest, **streets[number].tags})
-                del ends[number]
-        if not any(given.values()):
+    while loose := [number for number, around in short.items() if not all(map(leads_on, around))]:
+        short = {number: around for number, around in short.items() if number not in loose}
+    while short:
+        known = {number: _widest(streets, number, itertools.chain(*around)) for number, around in short.items()}
+        filled = {number: tags for number, tags in known.items() if tags is not None}
+        if not filled:
             break
+        for number, tags in filled.items():
+            streets[number] = replace(streets[number], tags={**tags, **streets[number].tags})
+            del short[number]
     return replace(extract, ways={**extract.ways, **streets})
+
+
+def _widest(streets: Mapping[int, Way], number: int, onward: Iterable[int]) -> Tags | None:
+    """Return the tags for lanes of the widest street that continues a way; None if none has a number of lanes.
+
+    A lane too many is a taper, and one too few is a post in a lane.
+    """
+    known = [streets[other] for other in onward if has_lane_count(streets[other].tags)]
+    options = (_lanes_along(streets[number], other) for other in known)
+    return max(options, key=lambda tags: sum(lane_counts(tags).values()), default=None)
 
 
 def _is_short(extract: Extract, way: Way) -> bool:

@@ -175,8 +175,7 @@ def street_model(streets: StreetMap, description: SiteDescription) -> Generator[
     yield _step("checks")
     names = street_names(road_map)
     seen = _sight_area(street.region, parts)
-    occluders = [part for part in (*furniture.parts, *other_levels) if Role.OCCLUDERS in part.roles]
-    bare = () if any(_hides(part, seen) for part in occluders) else (NO_OBSTACLES_MESSAGE,)
+    bare = () if any(_hides(part, seen) for part in (*furniture.parts, *other_levels)) else (NO_OBSTACLES_MESSAGE,)
     unnamed = UNNAMED_ROAD if description.from_centre_lines else ""
     warnings = road_warnings(road_map, (*street.lanes, *street.crossing.lanes), names, origin, unnamed)
     return SiteModel(
@@ -296,7 +295,9 @@ def _sight_area(region: BaseGeometry, parts: Sequence[Part]) -> BaseGeometry:
 
 
 def _hides(part: Part, area: BaseGeometry) -> bool:
-    """Return whether a part reaches into an area and is large enough to hide targets there."""
+    """Return whether an occluder reaches into an area and is large enough to hide targets there."""
+    if Role.OCCLUDERS not in part.roles:
+        return False
     plan = shapely.MultiPoint(part.solid.vertices[:, :2] + part.foot[:2]).convex_hull
     return can_hide(part.solid.vertices) and bool(area.intersects(plan))
 
