@@ -34,10 +34,11 @@ from ..world.openstreetmap.site import (
     surroundings_of_map,
 )
 from ..world.streetscape import road_surface
-from ..world.streetscape.description import DEFAULT_RADIUS, SiteDescription, describe_place
+from ..world.streetscape.description import DEFAULT_RADIUS, SiteDescription
 from ..world.streetscape.levels import UnclearLevelError
 from ..world.streetscape.model import SiteModel, street_model
 from ..world.streetscape.place import SCENE_MARGIN, Place
+from ..world.streetscape.site_file import describe_place
 from ..world.streetscape.street_map import StreetMap, opendrive_streets
 
 DOWNLOAD_MARGIN = 200.0  # metres beyond the streets that are laid out: `site_of_extract` reads no more

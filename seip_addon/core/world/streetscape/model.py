@@ -168,7 +168,7 @@ def street_model(streets: StreetMap, description: SiteDescription) -> Generator[
         *laid,
         verge_part(street, furniture.parts, laid),
         *other_levels,
-        marking_part(street, stop_lines=bool(furniture.signals or described.signal_poles)),
+        marking_part(street, has_signals=bool(furniture.signals or described.signal_poles)),
         *furniture.parts,
         *_overlay_parts(place, described, objects, street),
     ]

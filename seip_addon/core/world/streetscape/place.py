@@ -11,13 +11,14 @@ from shapely.geometry.base import BaseGeometry
 from ...arrays import Float
 from ...errors import SeipError
 from ...geometry.plan import closed, opened, united
+from ...limits import SITE_RADIUS
 from ...site.scene_geometry import DEFAULT_WEIGHT
 from ..opendrive.junctions import find_junction, junction_area, nearest_junctions
 from ..opendrive.lanes import LaneSurface
 from ..opendrive.road_map import Junction, RoadMap
 from . import road_surface
 from .approaches import approach_lanes
-from .description import DEFAULT_RADIUS, MAX_RADIUS, SiteDescription
+from .description import DEFAULT_RADIUS, SiteDescription
 from .intersections import (
     JUNCTION_REACH,
     box_along,
@@ -98,7 +99,7 @@ class Place:
         """
         for lane in lanes:
             away = float(np.hypot(*(lane.left[0, :2] - lanes[0].left[0, :2])))
-            if away > 2 * MAX_RADIUS:
+            if away > 2 * SITE_RADIUS.most:
                 raise SeipError(
                     f"road {lane.road_id} lies {away:,.0f} m from road {lanes[0].road_id} of the same junction: "
                     "correct its <planView> in the map"

@@ -18,6 +18,7 @@ from .description import (
     PlacedSolid,
     SiteDescription,
 )
+from .lane_markings import markings, stop_lines
 from .parts import Part
 from .road_surface import SurfaceLayers, without_crumbs
 from .site_ground import MIN_PASSAGE, SiteGround, triangles_of
@@ -191,12 +192,12 @@ def _plan(part: Part) -> BaseGeometry:
     )
 
 
-def marking_part(street: SiteGround, *, stop_lines: bool) -> Part:
+def marking_part(street: SiteGround, *, has_signals: bool) -> Part:
     """Return the markings of the lanes, with stop lines where there are signals."""
     inside = road_surface.junctions_in_plan(street.lanes) if street.areas is None else street.areas.inside
-    quads = road_surface.markings(street.lanes, street.extent, inside)
-    if stop_lines:
-        lines = road_surface.stop_lines(street.lanes, inside)
+    quads = markings(street.lanes, street.extent, inside)
+    if has_signals:
+        lines = stop_lines(street.lanes, inside)
         lines = lines[shapely.contains_xy(street.extent, lines[:, :, :2].mean(axis=1))]
         quads = np.concatenate([quads, lines])
     return Part("Lane markings", from_faces(quads, "marking"), (Role.DRESSING,))
