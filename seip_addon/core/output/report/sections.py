@@ -35,7 +35,7 @@ from ..results.verification_text import (
     signed_points,
     vehicles,
 )
-from .blind_spots import BlindSpot, blind_spots, centres, seen_places
+from .blind_spots import BlindSpot, blind_spots, centres, seen_places, seen_streets
 from .blocks import Block, Bullets, Card, Code, Facts, Paragraph, Picture, Pictures, Report, Section, Table
 from .evidence import Evidence
 from .figures import blind_spot_map, front_chart
@@ -384,18 +384,12 @@ def _places(evidence: Evidence) -> Iterator[Block]:
     yield Paragraph(
         f"{percent(coverage.whole)} of the road is seen by a sensor, {percent(coverage.seen_twice)} by two or more."
     )
-    places = seen_places(evidence.site.targets, evidence.seen_by, evidence.site.areas)
-    returns = {one.name: one.least for one in record.crossings}
-    streets = tuple(
-        (one.name, f"{one.area:,.0f}", percent(one.seen), percent(one.seen_twice))
-        for one in places
-        if one.name not in returns
-    )
-    if streets:
-        yield Table(("Street", "Area, m²", "Seen", "Twice"), streets, frozenset({1, 2, 3}))
-    crossings = tuple(
-        (one.name, percent(one.seen), returns_text(returns[one.name])) for one in places if one.name in returns
-    )
+    site, returns = evidence.site, {one.name: one.least for one in record.crossings}
+    parts = seen_streets(site.targets, evidence.seen_by, [one for one in site.areas if one.name not in returns])
+    streets = ((one.name, f"{one.area:,.0f}", percent(one.seen), percent(one.seen_twice)) for one in parts)
+    yield Table(("Street", "Area, m²", "Seen", "Twice"), tuple(streets), frozenset({1, 2, 3}))
+    places = seen_places(site.targets, evidence.seen_by, [one for one in site.areas if one.name in returns])
+    crossings = tuple((one.name, percent(one.seen), returns_text(returns[one.name])) for one in places)
     if crossings:
         yield Table(("Crossing", "Surface seen", "Points on a pedestrian"), crossings, frozenset({1, 2}))
         yield Paragraph(
