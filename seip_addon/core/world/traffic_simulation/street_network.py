@@ -189,7 +189,7 @@ class _Reader:
 
     def _location(self, attributes: Attributes) -> None:
         offset = np.array(attributes["netOffset"].split(","), dtype=np.float64)
-        self.network = replace(self.network, offset=offset, projection=attributes["projParameter"])
+        self.network = replace(self.network, offset=offset, projection=attributes.get("projParameter", ""))
 
     def _edge(self, attributes: Attributes) -> None:
         number, function = attributes["id"], attributes.get("function", "")
