@@ -354,13 +354,13 @@ def _sensor_facts(evidence: Evidence, sensor: RecordedSensor, items: Mapping[str
 def _coordinates(sensor: RecordedSensor) -> Iterator[tuple[str, str]]:
     if sensor.easting_m is None or sensor.northing_m is None:
         x, y, z = sensor.map_m
-        yield "Map x, y, z", f"{x:.3f}, {y:.3f}, {z:.3f} m"
+        yield "Map x, y, z", f"{x:.1f}, {y:.1f}, {z:.1f} m"
         return
-    yield "Easting, northing", f"{sensor.easting_m:.3f}, {sensor.northing_m:.3f} m"
+    yield "Easting, northing", f"{sensor.easting_m:.1f}, {sensor.northing_m:.1f} m"
     if sensor.latitude_deg is not None and sensor.longitude_deg is not None:
-        yield "Latitude, longitude", f"{sensor.latitude_deg:.8f}°, {sensor.longitude_deg:.8f}°"
+        yield "Latitude, longitude", f"{sensor.latitude_deg:.6f}°, {sensor.longitude_deg:.6f}°"
     if sensor.altitude_m is not None:
-        yield "Altitude", f"{sensor.altitude_m:.3f} m above the map's zero"
+        yield "Altitude", f"{sensor.altitude_m:.1f} m above the zero of the map's heights"
 
 
 def _projection(evidence: Evidence) -> str:
@@ -613,6 +613,11 @@ def _sources(evidence: Evidence) -> Iterator[Block]:
     lines = [f"Map data: {credit}." for credit in record.site.attribution] or [
         "Map data: the scene names no source that demands a credit."
     ]
+    if any("OpenStreetMap" in credit for credit in record.site.attribution):
+        lines.append(
+            "OpenStreetMap is mostly drawn from aerial images, and may be off by several metres: set posts out from "
+            "the kerb, not by coordinates."
+        )
     if any(sensor.sensor in PAPER_TYPES for sensor in record.sensors):
         lines.append("Sensor types 1 to 3 and their prices: SEIP study of infrastructure-based collective perception.")
     version = record.versions.get("seip", "")
@@ -625,6 +630,9 @@ def _sources(evidence: Evidence) -> Iterator[Block]:
             for row in record.site.sources
         )
         yield Table(("Objects", "Source", "Number", "Assumed"), rows, frozenset({2, 3}))
+    if record.site.assumptions:
+        yield Paragraph("What was assumed or left out when the scene was built from the map:")
+        yield Bullets(tuple(sentence(note) for note in record.site.assumptions))
 
 
 def _making(evidence: Evidence) -> Iterator[Block]:
