@@ -8,10 +8,9 @@ from pathlib import Path
 from headless import survey
 from headless.detection.detector import SHIPPED_DETECTOR, Detector
 from headless.detection.recordings import MountedSensors, Simulator, sampled_runs
-from headless.detection.rules import RULES, precision_by
-from headless.studies.criteria.precision import CLASSES
+from headless.detection.rules import CLASSES, RULES, precision_by
+from headless.detection.stored_detections import stored_detections
 from headless.studies.detection.case_study import split_untrained
-from headless.studies.stored_detections import stored_detections
 
 import bpy
 import numpy as np

@@ -5,12 +5,6 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
-from headless.detection.detector import Detector
-from headless.detection.detector_evaluation import detect_in_runs
-from headless.detection.frame_results import EvaluatedBoxes, FrameResult, GroundTruth
-from headless.detection.recordings import MountedSensors, SampledRun, Simulator
-from headless.studies.simulated_recordings import frames_key
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -18,6 +12,11 @@ from seip_addon.core.progress import Progress
 from seip_addon.core.storage.array_file import ArrayFile
 from seip_addon.core.storage.files import digest
 from seip_addon.core.storage.source_digest import source_digest
+
+from .detector import Detector
+from .detector_evaluation import detect_in_runs
+from .frame_results import EvaluatedBoxes, FrameResult, GroundTruth
+from .recordings import MountedSensors, SampledRun, Simulator, frames_key
 
 TABLES = {"truth": GroundTruth, "detected": EvaluatedBoxes}
 TYPES = {"category": "U", "points": "i8", "inside": "b1", "parked": "b1"}  # of columns; of others float64

@@ -8,12 +8,13 @@ pytest.importorskip("torch", reason="torch is not installed: make detection")
 
 from headless import survey
 from headless.detection.recordings import MountedSensors, Simulator, sampled_runs
+from headless.detection.shared_scans import SharedScans
 from headless.options import new_parser
-from headless.studies.criteria.shared_scans import SharedScans
 
 import numpy as np
 
 from seip_addon.core.choosing.placement.deployment import sensor_at
+from seip_addon.core.progress import finish
 from seip_addon.core.sensing.scans.frame import Labels
 from seip_addon.core.sensing.scans.sensor import MountedSensor
 from seip_addon.core.sensing.scans.simulation import ScanSettings
@@ -39,7 +40,8 @@ def test_frames_are_bit_for_bit_those_of_each_placement_alone(surveyed, small_sc
     simulator = Simulator(surveyed.geometry, ScanSettings(seed=3, rolling_shutter=rolling))
     shared = SharedScans(simulator, placements)
     for run in runs:
-        found = list(shared.frames(run))
+        finish(shared.cast(run))
+        found = list(shared.frames(run, range(len(run.times)), range(3)))
         assert [number for number, _ in found] == [0, 1, 2] * len(run.times)
         for place, (number, frame) in enumerate(found):
             alone = simulator.frame(placements[number], run, place // 3)
