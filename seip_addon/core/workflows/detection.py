@@ -2,7 +2,7 @@
 
 import os
 import re
-from collections.abc import Generator
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -101,18 +101,7 @@ def detect_elsewhere(job: DetectionJob, scene: Path, folder: Path) -> Generator[
         The command fails, or its result cannot be read or written.
     """
     results, log = scene.parent / "results", scene.parent / "log"
-    variables = {"PYTHONUTF8": "1", "SEIP_SECONDS_BETWEEN_LINES": _SECONDS_BETWEEN_LINES}
-    running = run_logged(job.command(scene, results), log, _progress, folder=job.python.folder, environment=variables)
-    try:
-        status = yield from running
-    except OSError as error:
-        raise SeipError(
-            f"{job.python.program} cannot be started ({error.strerror}): name the Python with PyTorch in the "
-            "preferences of the extension"
-        ) from error
-    output = log.read_text(encoding="utf-8", errors="replace")
-    if status != 0:
-        raise SeipError(_failure(output, status, job.python.program))
+    yield from run_elsewhere(job.python, job.command(scene, results), log)
     try:
         text = (results / RECORD).read_text(encoding="utf-8")
         parsed_detection(text)
@@ -121,6 +110,27 @@ def detect_elsewhere(job: DetectionJob, scene: Path, folder: Path) -> Generator[
         reason = error.strerror or str(error)
         raise SeipError(f"cannot write to {folder}: {reason}; choose a folder that you may write to") from error
     return text
+
+
+def run_elsewhere(python: DetectingPython, command: Sequence[str | Path], log: Path) -> Generator[Progress, None, None]:
+    """Run a command of this project in a Python with PyTorch, with its output in a file.
+
+    Raises
+    ------
+    SeipError
+        It cannot be started, or fails; with its own reason.
+    """
+    words = [os.fspath(word) for word in command]
+    variables = {"PYTHONUTF8": "1", "SEIP_SECONDS_BETWEEN_LINES": _SECONDS_BETWEEN_LINES}
+    try:
+        status = yield from run_logged(words, log, _progress, folder=python.folder, environment=variables)
+    except OSError as error:
+        raise SeipError(
+            f"{python.program} cannot be started ({error.strerror}): name the Python with PyTorch in the "
+            "preferences of the extension"
+        ) from error
+    if status != 0:
+        raise SeipError(_failure(log.read_text(encoding="utf-8", errors="replace"), status, python.program))
 
 
 def _progress(output: str) -> Progress:

@@ -15,6 +15,7 @@ import numpy as np
 
 from ...arrays import Float, Integer
 from ...choosing.placement.deployment import GainBand, Sensor, TypeBand, price_text
+from ...choosing.placement.judgement import Judgement
 from ...choosing.placement.objective import FrontPoint, Solution
 from ...choosing.placement.problem import Placement
 from ...choosing.placement.returns_summary import CrossingReturns, ReturnsPoint, ReturnsSummary, share_reached
@@ -238,6 +239,8 @@ class PlacementRecord:
         Best placements found with fewer and more sensors; records of earlier versions lack it.
     crossings : tuple of CrossingReturns
         Expected returns from a pedestrian on each crossing; records of earlier versions lack them.
+    judgement : Judgement, optional
+        What a detector finds with it and with other finalists, where the placement was chosen among such.
     """
 
     site: RecordedSite
@@ -257,6 +260,7 @@ class PlacementRecord:
     returns: ReturnsSummary | None = None
     front: tuple[FrontPoint, ...] = ()
     crossings: tuple[CrossingReturns, ...] = ()
+    judgement: Judgement | None = None
 
     @cached_property
     def request(self) -> RecordedSettings:
@@ -364,6 +368,7 @@ def placement_record(
         returns=deployment.returns and _rounded_returns(deployment.returns),
         front=tuple(_rounded_point(point) for point in solution.front),
         crossings=_rounded_crossings(solution.crossings),
+        judgement=solution.judgement,
     )
 
 
@@ -371,7 +376,7 @@ def _without_absent(items: list[tuple[str, Any]]) -> dict[str, Any]:
     return {name: value for name, value in items if name not in _LEFT_OUT or value is not None}
 
 
-_LEFT_OUT = {"roll_deg", "installation_usd", "returns"}  # where there are none
+_LEFT_OUT = {"roll_deg", "installation_usd", "returns", "judgement"}  # where there are none
 
 
 def _geo_reference(known: GeoReference) -> RecordedGeoReference | None:
