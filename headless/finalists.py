@@ -61,7 +61,7 @@ def check_finalists(options: argparse.Namespace, objective: Objective) -> None:
 
 
 def judge(surveyed: Survey, watch: survey.Stopwatch, solution: Solution, options: argparse.Namespace) -> Solution:
-    """Choose among finalists near a solution by detection, print their figures, and return the solution of the winner."""
+    """Choose among finalists by detection, print their figures, and return the solution of the winner."""
     from headless.detection.judging import judge_finalists  # noqa: PLC0415  # needs torch
 
     finalists = watch.run("finalists", find_finalists(surveyed, solution, options.finalists))
@@ -91,9 +91,9 @@ def _map_of(scene: Path | None) -> Path:
     found = next((path for end in (NETWORK_SUFFIX, ".xodr") if (path := scene.with_suffix(end)).is_file()), None)
     if found is None:
         raise SeipError(
-            f"there is no traffic to judge finalists in: name runs with --judge-on, or put runs into "
-            f"{traffic_folder(scene)}, or the site's streets ({scene.stem}{NETWORK_SUFFIX}) beside the scene to have it "
-            "simulated by SUMO"
+            "there is no traffic to judge finalists in: name runs with --judge-on, put some into "
+            f"{traffic_folder(scene)}, or put the site's streets ({scene.stem}{NETWORK_SUFFIX}) beside the scene, for "
+            "SUMO to simulate some"
         )
     find_sumo()
     return found

@@ -199,10 +199,9 @@ def counted_classes(frames: Sequence[FrameResult], weights: Mapping[str, float])
     runs = len(np.unique(names))
     counted = {}
     for name, weight in weights.items():
-        present = [
-            frame.truth.inside & np.isin(frame.truth.category, RULES[CLASSES[name]].categories) for frame in frames
-        ]
-        if weight and len(np.unique(names[[bool(some.any()) for some in present]])) >= min(MIN_TEST_RUNS, runs):
+        wanted = RULES[CLASSES[name]].categories
+        present = [bool((one.truth.inside & np.isin(one.truth.category, wanted)).any()) for one in frames]
+        if weight and len(np.unique(names[present])) >= min(MIN_TEST_RUNS, runs):
             counted[name] = weight
     if not counted:
         raise SeipError("too few road users are in the region of interest to judge finalists by: take longer runs")

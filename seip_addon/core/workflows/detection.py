@@ -64,15 +64,19 @@ class DetectionJob:
 
     def command(self, scene: Path, output: Path) -> list[str]:
         """Return the command for a .blend with sensors and a folder of results."""
-        words: list[str | Path] = [self.python.program, "-m", "headless", "detect", scene, "-o", output]
-        words += ["--traffic", *self.runs]
+        words = [self.python.program, "-m", "headless", "detect", scene, "-o", output, *self.options()]
+        return [os.fspath(word) for word in words]
+
+    def options(self) -> list[str | Path]:
+        """Return the options that name the runs, the detector, catalogues and the weather."""
+        words: list[str | Path] = ["--traffic", *self.runs]
         for option, values in (
             ("--detector", (self.detector,) if self.detector is not None else ()),
             ("--catalogue", self.catalogue),
             ("--weather", self.weather.words()),
         ):
             words += [option, *values] if values else []
-        return [os.fspath(word) for word in words]
+        return words
 
 
 def detect_elsewhere(job: DetectionJob, scene: Path, folder: Path) -> Generator[Progress, None, str]:

@@ -66,7 +66,7 @@ def find_finalists(
     """Return placements to judge; the first is the solution itself.
 
     The best by road seen, by returns with and without the allowance for traffic, and by both with mounts of one height
-    alone; then placements near these in turn, in which one sensor has another pose at its position, or another position.
+    alone; then placements near these in turn, in which one sensor has another pose at its position, or another one.
 
     Parameters
     ----------
@@ -182,7 +182,8 @@ def _fits(problem: PlacementProblem, rest: Integer) -> Boolean:
     if problem.budget is not None:
         fits &= math.fsum(problem.prices[rest]) + problem.prices <= problem.budget * (1 + TIE_TOLERANCE)
     groups = problem.mandatory_groups
-    return fits & groups[~groups[:, rest].any(axis=1)].all(axis=0)
+    fits &= groups[~groups[:, rest].any(axis=1)].all(axis=0)
+    return fits
 
 
 def _in_order(problem: PlacementProblem, chosen: Integer) -> Integer:

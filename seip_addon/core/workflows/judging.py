@@ -17,7 +17,7 @@ from ..sensing.lidar.model import LidarModel
 from ..sensing.scans.sensor import MountedSensor
 from ..storage.files import save_json
 from ..storage.json_dataclass import from_json
-from .detection import DetectingPython, run_elsewhere
+from .detection import DetectionJob, run_elsewhere
 from .finalists import Finalist
 from .survey import Survey
 
@@ -113,14 +113,12 @@ def read_request(path: Path) -> JudgementRequest:
 
 
 def judge_elsewhere(
-    python: DetectingPython, words: Sequence[str | Path], request: JudgementRequest, scene: Path, folder: Path
+    job: DetectionJob, request: JudgementRequest, scene: Path, folder: Path
 ) -> Generator[Progress, None, Judgement]:
     """Judge finalists in another Python, which has PyTorch.
 
     Parameters
     ----------
-    words : sequence of str or path
-        Options of the command: runs of traffic, catalogues and weather.
     scene : path
         A .blend in a folder for temporary files.
     folder : path
@@ -133,8 +131,8 @@ def judge_elsewhere(
     """
     asked, answered = scene.parent / "finalists.json", scene.parent / "judgement.json"
     request.save(asked)
-    command = [python.program, "-m", "headless.judge", scene, asked, answered, "-o", folder, *words]
-    yield from run_elsewhere(python, command, scene.parent / "log")
+    command = [job.python.program, "-m", "headless.judge", scene, asked, answered, "-o", folder, *job.options()]
+    yield from run_elsewhere(job.python, command, scene.parent / "log")
     return _read(Judgement, answered)
 
 

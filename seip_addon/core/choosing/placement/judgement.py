@@ -114,12 +114,13 @@ class Judgement:
         weights = list(self.weights.values())
         shares = f" weighted {' : '.join(f'{one:g}' for one in weights)}" if len(set(weights)) > 1 else ""
         classes = ", ".join(f"{name} {one.describe()}" for name, one in winner.precision.items() if name != MEAN)
-        lines = [
+        chosen = (
             f"Chosen by detection among {counted(len(self.finalists), 'finalist')} ({self.winner.name}): largest mean "
             f"AP of {', '.join(self.weights)}{shares} in {counted(self.winner.frames, 'frame')} of "
-            f"{counted(len(self.judged_on), 'run')}.",
-            f"AP in {counted(len(self.figures_on), 'other run')}: {classes}; mean {winner.precision[MEAN].describe()}.",
-        ]
+            f"{counted(len(self.judged_on), 'run')}."
+        )
+        mean = winner.precision[MEAN].describe()
+        lines = [chosen, f"AP in {counted(len(self.figures_on), 'other run')}: {classes}; mean {mean}."]
         for one in self.figures[1:]:
             name = self.finalists[one.finalist].name
             other = f"the best by the criterion, {name}" if one.finalist == 0 else f"the runner-up, {name}"
