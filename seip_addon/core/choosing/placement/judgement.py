@@ -103,6 +103,12 @@ class Judgement:
     figures_on: tuple[str, ...]
     figures: tuple[FinalFigures, ...]
 
+    def __post_init__(self) -> None:
+        if not self.figures or not all(one.finalist in range(len(self.finalists)) for one in self.figures):
+            raise ValueError("the figures are not of finalists")
+        if not all(MEAN in one.precision for one in (*self.finalists, *self.figures)):
+            raise ValueError(f"average_precision.{MEAN} is missing")
+
     @property
     def winner(self) -> JudgedFinalist:
         """The finalist with the largest mean average precision."""
