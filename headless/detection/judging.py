@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from seip_addon.core.arrays import Float
-from seip_addon.core.choosing.placement.judgement import MEAN, Figure, FinalFigures, JudgedFinalist, Judgement
+from seip_addon.core.choosing.placement.judgement import MEAN, Figure, JudgedFinalist, Judgement
 from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import Progress
 from seip_addon.core.sensing.lidar.model import LidarModel
@@ -19,7 +19,7 @@ from seip_addon.core.sensing.traffic.run_overlap import require_independent, veh
 from seip_addon.core.sensing.traffic.site_traffic import check_runs, require_own_traffic
 from seip_addon.core.sensing.weather import Weather
 from seip_addon.core.site.scene_geometry import SceneGeometry
-from seip_addon.core.workflows.judging import JudgementRequest
+from seip_addon.core.workflows.finalists import JudgementRequest
 
 from .average_precision import (
     MIN_TEST_RUNS,
@@ -68,16 +68,8 @@ Judge = Callable[[Sequence[int], int], Generator[Progress, None, Sequence[Score]
 """From the finalists that are left, and the number of the round, to their scores in all frames so far."""
 
 
-@dataclass(frozen=True)
-class Standing:
-    """Result of a finalist: the number of rounds in which it was judged, and its score after the last of them."""
-
-    rounds: int
-    value: float
-
-
-def halve(count: int, rounds: int, judge: Judge) -> Generator[Progress, None, list[Standing]]:
-    """Judge finalists in rounds until one is left, and return their standings; the largest is the winner's.
+def halve(count: int, rounds: int, judge: Judge) -> Generator[Progress, None, list[int]]:
+    """Judge finalists in rounds until one is left, and return their numbers, the winner first.
 
     After each round those go that are behind the leader by a difference whose 95 % interval, over the same runs,
     excludes zero: later rounds, which have more frames, cost less (successive halving; Jamieson and Talwalkar 2016).
@@ -87,16 +79,16 @@ def halve(count: int, rounds: int, judge: Judge) -> Generator[Progress, None, li
     count : int
         Number of finalists.
     """
-    standings, left = [Standing(0, 0.0)] * count, list(range(count))
+    rank, left = [(0, 0.0)] * count, list(range(count))  # rounds in which each was judged, and its score after them
     for number in range(rounds):
         scores = dict(zip(left, (yield from judge(left, number)), strict=True))
-        for one, score in scores.items():
-            standings[one] = Standing(number + 1, score.value)
         leader = max(left, key=lambda one: scores[one].value)
+        for one in left:
+            rank[one] = number + 1, scores[one].value
         left = [one for one in left if one == leader or not _is_behind(scores[leader].lead_over(scores[one]))]
         if len(left) == 1:
             break
-    return standings
+    return sorted(range(count), key=lambda one: rank[one], reverse=True)
 
 
 def _is_behind(lead: Figure) -> bool:
@@ -132,11 +124,13 @@ def judge_finalists(
     SeipError
         There are fewer than two runs, they are not independent traffic of the site, or too few road users occur.
     """
-    runs = sampled_runs(paths, geometry.origin, EVERY)
-    judged, others = _split(runs, geometry)
-    placements = [MountedSensors(one.name, one.mounted(models)) for one in request.finalists]
-    sensors = [sensor for one in placements for sensor in one.sensors]
+    judged, others = _split(sampled_runs(paths, geometry.origin, EVERY), geometry)
+    placements = [
+        MountedSensors(one.name, tuple(sensor.mounted(models[sensor.sensor]) for sensor in one.sensors))
+        for one in request.finalists
+    ]
     settings = ScanSettings(rolling_shutter=True, weather=tuple(weather.words()))
+    sensors = [sensor for one in placements for sensor in one.sensors]
     shared = SharedScans(Simulator(geometry, settings, sensors), placements)
     detector = Detector.load(SHIPPED_DETECTOR)
     frames: list[list[FrameResult]] = [[] for _ in placements]
@@ -148,28 +142,28 @@ def judge_finalists(
         weights = counted_classes(frames[left[0]], request.weights)
         return [score_of(frames[one], weights) for one in left]
 
-    standings = yield from halve(len(placements), len(ROUNDS), judge)
-    ranked = sorted(range(len(placements)), key=lambda one: (-standings[one].rounds, -standings[one].value, one))
+    ranked = yield from halve(len(placements), len(ROUNDS), judge)
     shown = list(dict.fromkeys([*ranked[:2], 0]))
-    final = yield from detect_with_all(shared, others, detector, folder, placements=shown)
+    found = yield from detect_with_all(shared, others, detector, folder, placements=shown)
+    final = dict(zip(shown, found, strict=True))
     weights = counted_classes(frames[ranked[0]], request.weights)
-    tested = counted_classes(final[0], weights)
-    scores = [score_of(own, tested) for own in final]
-    return Judgement(
-        finalists=tuple(
-            JudgedFinalist(
-                one.name, one.places, one.poses, len(own), precisions_of(own, counted_classes(own, request.weights))
-            )
-            for one, own in zip(request.finalists, frames, strict=True)
-        ),
-        weights=weights,
-        judged_on=tuple(run.name for run in judged),
-        figures_on=tuple(run.name for run in others),
-        figures=tuple(
-            FinalFigures(one, precisions_of(own, tested), scores[0].lead_over(score) if number else None)
-            for number, (one, own, score) in enumerate(zip(shown, final, scores, strict=True))
-        ),
-    )
+    tested = counted_classes(final[ranked[0]], weights)
+    scores = {one: score_of(own, tested) for one, own in final.items()}
+
+    def record(one: int) -> JudgedFinalist:
+        asked, own = request.finalists[one], frames[one]
+        return JudgedFinalist(
+            name=asked.name,
+            places=tuple(f"{sensor.position} at {sensor.height_m:g} m" for sensor in asked.sensors),
+            poses=asked.poses,
+            frames=len(own),
+            precision=precisions_of(own, counted_classes(own, request.weights)),
+            final=precisions_of(final[one], tested) if one in final else None,
+            behind=scores[ranked[0]].lead_over(scores[one]) if one in shown[1:] else None,
+        )
+
+    names = [tuple(run.name for run in runs) for runs in (judged, others)]
+    return Judgement(tuple(map(record, ranked)), ranked.index(0), weights, names[0], names[1])
 
 
 def _split(runs: Sequence[SampledRun], geometry: SceneGeometry) -> tuple[Sequence[SampledRun], Sequence[SampledRun]]:

@@ -22,8 +22,7 @@ from ..core.output.results.versions import versions
 from ..core.progress import Progress
 from ..core.storage.files import unfinished_name
 from ..core.workflows.detection import DetectionJob
-from ..core.workflows.finalists import find_finalists, judged_solution, require_judged
-from ..core.workflows.judging import judge_elsewhere, judgement_request
+from ..core.workflows.finalists import check_judged, find_finalists, judge_elsewhere, judged_solution
 from ..core.workflows.placing import place, with_context
 from ..core.workflows.records import record_of
 from ..core.workflows.traffic_runs import found_runs, read_runs
@@ -83,7 +82,7 @@ class SEIP_OT_judge_placement(Conditional, _Placing, bpy.types.Operator):
         if python is None:
             raise SeipError(NO_PYTHON)
         objective = seip.goal.objective()
-        require_judged(objective)
+        check_judged(objective)
         runs = tuple(found_runs(runs_folder(seip.goal.runs)))
         job = DetectionJob(python, runs, None, preferences.catalogue_files(), seip.survey.weather())
         folder = output_folder(seip.detection.folder, "the detections")
@@ -109,7 +108,7 @@ def _judged(
         state = yield from _placed(surveying, objective, None, acceptance)
         survey, solution = state.placed()
         began = time.perf_counter()
-        request = judgement_request(survey, objective.shares, (yield from find_finalists(survey, solution)))
+        request = yield from find_finalists(survey, solution)
         judgement = yield from judge_elsewhere(job, request, scene, folder)
         solution = yield from judged_solution(survey, solution, judgement)
         return replace(state, solution=solution, durations=state.timed("judging", began))

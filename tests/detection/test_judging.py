@@ -2,7 +2,7 @@
 
 import json
 import sys
-from dataclasses import asdict
+from dataclasses import asdict, replace
 
 import pytest
 
@@ -22,13 +22,15 @@ import numpy as np
 from seip_addon.core.choosing.placement.judgement import MEAN
 from seip_addon.core.errors import SeipError
 from seip_addon.core.output.results.placement_file import load_placement
+from seip_addon.core.output.results.placement_record import recorded_sensor
 from seip_addon.core.progress import Progress, finish
 from seip_addon.core.sensing.lidar.catalogue import find_models, load_catalogue
 from seip_addon.core.sensing.weather import Weather
-from seip_addon.core.workflows.judging import JUDGED_CLASSES, JudgedSensor, JudgementRequest, RequestedFinalist
+from seip_addon.core.workflows.finalists import JUDGED_CLASSES, Finalist, JudgementRequest
 from seip_addon.scene.blend_file import open_blend
 from seip_addon.scene.read import read_scene
 from tests.builders.labelled_frames import SIZES, box, detected, frame, truth
+from tests.builders.small_junction import make_example
 from tests.builders.small_scene import make_run
 
 CARS = [box(20.0 * number) for number in range(10)]
@@ -59,8 +61,7 @@ def test_halving_drops_those_that_are_clearly_behind_and_never_the_best(seed):
     random = np.random.default_rng(seed)
     quality = random.permutation(np.concatenate([[0.8], random.uniform(0.4, 0.65, 11)]))
     judge, judged = judge_of(quality, 0.05, 8, random)
-    standings = finish(halve(12, 3, judge))
-    best = max(range(12), key=lambda one: (standings[one].rounds, standings[one].value))
+    best, *_ = finish(halve(12, 3, judge))
     assert best == int(np.argmax(quality))
     assert all(best in left for left in judged)
     assert sum(map(len, judged)) < 18  # of 36
@@ -70,17 +71,21 @@ def test_halving_keeps_those_that_are_alike_to_the_end():
     random = np.random.default_rng(1)
     quality = np.array([0.5, 0.8, 0.805, 0.55])
     judge, judged = judge_of(quality, 0.05, 8, random)
-    standings = finish(halve(4, 3, judge))
+    ranked = finish(halve(4, 3, judge))
     assert [len(left) for left in judged] == [4, 2, 2]
-    assert [one.rounds for one in standings] == [1, 3, 3, 1]
+    assert (set(ranked[:2]), ranked[2:]) == ({1, 2}, [3, 0])
 
 
 def test_without_intervals_nobody_is_dropped():
+    rounds = []
+
     def judge(left, _number):
+        rounds.append(left)
         yield Progress(0, 1, "judge")
         return [Score(0.1 * one) for one in left]
 
-    assert [one.rounds for one in finish(halve(4, 3, judge))] == [3] * 4
+    assert finish(halve(4, 3, judge)) == [3, 2, 1, 0]
+    assert rounds == [[0, 1, 2, 3]] * 3
 
 
 def told(run, number, cars, walkers=4):
@@ -100,15 +105,14 @@ def site(small_scene, tmp_path_factory):
     paths = [folder / f"run-{number}.npz" for number in range(8)]
     for number, path in enumerate(paths):
         make_run(50 + number, 42.0).save(path)
-    turned = tuple(np.eye(3).ravel().tolist())
+    example = make_example(heights=(4.0,))
+    sensors = [recorded_sensor(sensor, example.site) for sensor in example.deployment.sensors]
     each = tuple(
-        RequestedFinalist(
-            name, (number,), (JudgedSensor("S1", "vlp16", f"post {number}", (9.0, -9.0, 4.0 + number), turned),)
-        )
+        Finalist(name, (number,), (replace(sensors[number % 2], height_m=4.0 + number),))
         for number, name in enumerate(("criterion", "second", "best", "bad"))
     )
     weights = dict(zip(JUDGED_CLASSES, (2.0, 1.0, 1.0), strict=True))
-    models = find_models(load_catalogue(), ["vlp16"])
+    models = find_models(load_catalogue(), sorted({sensor.sensor for sensor in sensors}))
     return read_scene(bpy.context.scene).geometry, JudgementRequest(each, weights), models, Weather(), paths
 
 
@@ -129,17 +133,19 @@ def test_the_winner_is_the_best_on_the_runs_of_the_choice_and_its_figures_are_of
     judgement = finish(judge_finalists(*site, "unused"))
     assert judgement.judged_on == ("run-0", "run-1", "run-2", "run-3")
     assert judgement.figures_on == ("run-4", "run-5", "run-6", "run-7")
-    assert judgement.winner.name == "best"
-    assert [one.finalist for one in judgement.figures] == [2, 1, 0]
+    names = ("best", "second", "criterion", "bad")
+    assert tuple(one.name for one in judgement.finalists) == names
+    assert judgement.plain == 2
     # two-wheelers are nowhere: cars count twice as much as pedestrians, who are all found
     assert judgement.weights == {"vehicles": 2.0, "pedestrians": 1.0}
-    chosen = {one.name: one.precision[MEAN].value for one in judgement.finalists}
-    assert chosen == pytest.approx({"criterion": 2.2 / 3, "second": 2.6 / 3, "best": 2.8 / 3, "bad": 1.2 / 3})
-    final = judgement.figures[0].precision
-    assert final["vehicles"].value == pytest.approx(0.8)
-    assert final[MEAN].value == pytest.approx(2.6 / 3)
-    assert judgement.figures[1].behind.value == pytest.approx(-0.2 / 3)
-    assert judgement.figures[2].behind.interval == pytest.approx((0.4 / 3, 0.4 / 3))
+    chosen = [one.precision[MEAN].value for one in judgement.finalists]
+    assert chosen == pytest.approx([2.8 / 3, 2.6 / 3, 2.2 / 3, 1.2 / 3])
+    winner, second, criterion, bad = judgement.finalists
+    assert winner.final["vehicles"].value == pytest.approx(0.8)
+    assert winner.final[MEAN].value == pytest.approx(2.6 / 3)
+    assert (winner.behind, bad.behind, bad.final) == (None, None, None)
+    assert second.behind.value == pytest.approx(-0.2 / 3)
+    assert criterion.behind.interval == pytest.approx((0.4 / 3, 0.4 / 3))
     # all differences are certain, so that after the first round only the leader is left
     assert [part for part, *_ in asked] == ["first", "others"]
     assert asked[0][1:] == ((0, 1, 2, 3), 8)
@@ -186,7 +192,7 @@ def test_the_command_again_gives_the_same_bytes_and_scans_nothing(judged, small_
     before = load_placement(judged / "placement.json")
     assert before.judgement is not None
     assert before.judgement.judged_on == ("run-1", "run-2")
-    assert tuple(before.poses) == before.judgement.winner.poses
+    assert set(before.poses) == set(before.judgement.finalists[0].poses)
     assert max(one.precision[MEAN].value for one in before.judgement.finalists) > 0.05
 
     def refuse(*_):

@@ -2,25 +2,32 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections import deque
-from collections.abc import Generator, Iterator
+from collections.abc import Generator, Iterator, Mapping
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from itertools import chain, zip_longest
+from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 
 from ..arrays import Boolean, Integer
 from ..choosing.placement.judgement import Judgement
 from ..choosing.placement.objective import Objective, Solution, criterion_of, placement_problem
-from ..choosing.placement.problem import TIE_TOLERANCE, PlacementProblem, assess, canonical_order
+from ..choosing.placement.problem import TIE_TOLERANCE, PlacementProblem, assess
 from ..choosing.placement.search_limits import SolverLimits
 from ..choosing.placement.solver import solve
 from ..choosing.robustness.gain_band import with_gain_band
 from ..errors import SeipError
+from ..output.results.placement_record import RecordedSensor, recorded_sensor
 from ..progress import Progress, within
 from ..site.site import Site
+from ..storage.files import save_json
+from ..storage.json_dataclass import from_json
+from .detection import DetectionJob, run_elsewhere
 from .returns import crossing_returns, survey_returns
 from .survey import Survey, surroundings
 
@@ -31,42 +38,41 @@ LONE_HEIGHTS = 3
 """Mounting heights, the lowest, a middle one and the highest, of which there are finalists of that height alone."""
 MOVED_BY = 8.0
 """Metres by which a sensor of a near placement is moved at least; nearer ones find nearly the same."""
+JUDGED_CLASSES = ("vehicles", "two-wheelers", "pedestrians")
+"""Classes of road users, in the order of the shares of an objective."""
+
+Content = TypeVar("Content")
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class Finalist:
-    """A placement that is to be judged.
-
-    Parameters
-    ----------
-    name : str
-        The criterion of which it is the best placement, or that of the finalist that it is near.
-    chosen : (k,) int64
-        Candidate poses.
-    problem : PlacementProblem
-        Problem of its criterion.
-    """
+    """A placement to judge: the criterion of which it is best, or the finalist that it is near; poses and sensors."""
 
     name: str
-    chosen: Integer
-    problem: PlacementProblem
+    poses: tuple[int, ...]
+    sensors: tuple[RecordedSensor, ...]
 
 
-def require_judged(objective: Objective) -> None:
-    """Raise SeipError if finalists cannot be judged for an objective."""
-    if objective.cheapest:
-        raise SeipError("finalists need a number of sensors or a budget, not a coverage to reach")
-    if objective.scenarios.kind != "nominal" or objective.measure is not None:
-        raise SeipError("finalists are judged in traffic as planned: leave out pose errors, traffic and failures")
+@dataclass(frozen=True)
+class JudgementRequest:
+    """Finalists, the best by the criterion first, and the weight of each class of road users."""
+
+    finalists: tuple[Finalist, ...]
+    weights: Mapping[str, float]
+
+    def save(self, path: Path) -> None:
+        """Write it to a file for `read_answer`."""
+        save_json(path, asdict(self))
 
 
 def find_finalists(
     survey: Survey, solution: Solution, number: int = DEFAULT_FINALISTS
-) -> Generator[Progress, None, list[Finalist]]:
+) -> Generator[Progress, None, JudgementRequest]:
     """Return placements to judge; the first is the solution itself.
 
-    The best by road seen, by returns with and without the allowance for traffic, and by both with mounts of one height
-    alone; then placements near these in turn, in which one sensor has another pose at its position, or another one.
+    The best by road seen, by returns with and without the allowance for traffic, and by the first two with mounts of
+    one height alone; then placements near these in turn, in which one sensor has another pose at its position, or
+    another position.
 
     Parameters
     ----------
@@ -80,98 +86,136 @@ def find_finalists(
     height = survey.site.candidates.height
     levels = np.unique(height)
     levels = levels[np.unique(np.linspace(0, len(levels) - 1, LONE_HEIGHTS).astype(np.int64))]
-    asked = [(name, problem, np.zeros(len(height), dtype=bool)) for name, problem in criteria]
-    if len(levels) > 1:
-        asked += [
-            (f"{name} with mounts of {level:g} m alone", problem, height != level)
-            for name, problem in criteria[:2]
-            for level in levels.tolist()
-        ]
-    first = criteria[0]
-    found = {_key(solution.placement.chosen): Finalist(first[0], solution.placement.chosen, first[1])}
-    for done, (name, problem, other) in enumerate(asked[1:]):
+    asked = [(name, problem, np.zeros(len(height), dtype=bool)) for name, problem in criteria[1:]]
+    for level in levels.tolist() if len(levels) > 1 else []:
+        asked += [(f"{name} with mounts of {level:g} m alone", one, height != level) for name, one in criteria[:2]]
+    first = solution.placement.chosen
+    found = {frozenset(first.tolist()): (criteria[0][0], first, criteria[0][1])}
+    for done, (name, problem, other) in enumerate(asked):
         progress = Progress(done, len(asked), f"choosing finalists by {name}")
         yield progress
         with suppress(SeipError):  # no placement is possible, as at one height alone
             alone = replace(problem, forbidden=~problem.allowed | other)
-            placement = yield from within(progress, solve(alone, limits))
-            finalist = Finalist(name, _in_order(problem, placement.chosen), problem)
+            chosen = np.sort((yield from within(progress, solve(alone, limits))).chosen)
             if len(found) < number:
-                found.setdefault(_key(finalist.chosen), finalist)
-    queues = deque(_near(survey.site, base, turn % 2) for turn, base in enumerate(found.values()))
-    while queues and len(found) < number:
-        near = next(queues[0], None)
+                found.setdefault(frozenset(chosen.tolist()), (name, chosen, problem))
+    nearby = deque(_near(survey.site, *base, turn % 2) for turn, base in enumerate(found.values()))
+    while nearby and len(found) < number:
+        near = next(nearby[0], None)
         if near is None:
-            queues.popleft()
+            nearby.popleft()
         else:
-            queues.rotate(-1)
-            found.setdefault(_key(near.chosen), near)
-    return list(found.values())
+            nearby.rotate(-1)
+            found.setdefault(frozenset(near[1].tolist()), near)
+    finalists = (Finalist(name, tuple(chosen.tolist()), _sensors(survey, chosen)) for name, chosen, _ in found.values())
+    return JudgementRequest(tuple(finalists), dict(zip(JUDGED_CLASSES, solution.objective.shares, strict=True)))
+
+
+def check_judged(objective: Objective) -> None:
+    """Raise SeipError if finalists cannot be judged for an objective."""
+    if objective.cheapest:
+        raise SeipError("finalists need a number of sensors or a budget, not a coverage to reach")
+    if objective.scenarios.kind != "nominal" or objective.measure is not None:
+        raise SeipError("finalists are judged in traffic as planned: leave out pose errors, traffic and failures")
 
 
 def judged_solution(survey: Survey, solution: Solution, judgement: Judgement) -> Generator[Progress, None, Solution]:
-    """Return the solution of the winner, with the bound, and other numbers of sensors, of the best by the criterion."""
-    chosen = np.array(judgement.winner.poses, dtype=np.int64)
-    if _key(chosen) == _key(solution.placement.chosen):
+    """Return the solution of the winner, with the bound and other numbers of sensors of the best by the criterion."""
+    chosen, known = np.array(judgement.finalists[0].poses, dtype=np.int64), solution.placement
+    if judgement.plain == 0:
         return replace(solution, judgement=judgement)
-    of_returns = solution.deployment.returns
-    returns = (yield from survey_returns(survey, solution.objective)) if of_returns is not None else None
-    problem = _road(survey, solution.objective) if returns is None else returns.problem()
-    known = solution.placement
-    placement = assess(
-        problem, chosen, problem.value(chosen), known.bound, optimal=False, solver=known.solver, notes=()
-    )
-    if returns is None or of_returns is None:
+    before = solution.deployment.returns
+    if before is None:
+        problem = placement_problem(survey.site, survey.grid.visible, survey.models, solution.objective)
+    else:
+        returns = yield from survey_returns(survey, solution.objective)
+        problem = returns.problem()
+    value, solver = problem.value(chosen), known.solver
+    placement = assess(problem, chosen, value, known.bound, optimal=False, solver=solver, notes=())
+    if before is None:
         winner = replace(solution, placement=placement, greedy=None, deployment=survey.deploy(chosen))
     else:
-        winner = returns.solution(placement, None)
-        summary = winner.deployment.returns
-        assert summary is not None  # noqa: S101  # it was chosen for returns
-        with_front = replace(summary, front=of_returns.front)
-        winner = replace(winner, deployment=replace(winner.deployment, returns=with_front))
+        winner = replace(returns.solution(placement, None), front=solution.front)
+        summary = replace(winner.deployment.returns or before, front=before.front)
+        winner = replace(winner, deployment=replace(winner.deployment, returns=summary))
     deployment = yield from with_gain_band(surroundings(survey), winner.deployment)
-    winner = replace(winner, deployment=deployment, front=solution.front, judgement=judgement)
+    winner = replace(winner, deployment=deployment, judgement=judgement)
     return replace(winner, crossings=crossing_returns(survey, winner))
+
+
+def judge_elsewhere(
+    job: DetectionJob, request: JudgementRequest, scene: Path, folder: Path
+) -> Generator[Progress, None, Judgement]:
+    """Judge finalists in another Python, which has PyTorch.
+
+    Parameters
+    ----------
+    scene : path
+        A .blend in a folder for temporary files.
+    folder : path
+        What was detected is kept in it.
+
+    Raises
+    ------
+    SeipError
+        The command fails.
+    """
+    asked, answered = scene.parent / "finalists.json", scene.parent / "judgement.json"
+    request.save(asked)
+    command = [job.python.program, "-m", "headless.finalists", scene, asked, answered, "-o", folder, *job.options()]
+    yield from run_elsewhere(job.python, command, scene.parent / "log")
+    return read_answer(Judgement, answered)
+
+
+def read_answer(kind: type[Content], path: Path) -> Content:
+    """Read a request or a judgement from a file.
+
+    Raises
+    ------
+    SeipError
+        It is none.
+    """
+    try:
+        return from_json(kind, json.loads(path.read_text(encoding="utf-8")))
+    except (OSError, ValueError) as error:
+        raise SeipError(f"{path} is damaged or missing ({error}): judge again") from error
 
 
 def _criteria(survey: Survey, objective: Objective) -> Generator[Progress, None, list[tuple[str, PlacementProblem]]]:
     """Return the criteria at hand with their problems, the plain one first and the other one of the product next."""
     returns = yield from survey_returns(survey, objective)
-    problem = returns.problem()
-    known = {"road": ("road seen", _road(survey, objective)), "returns": ("returns", problem)}
+    road = placement_problem(survey.site, survey.grid.visible, survey.models, objective)
+    known = {"road": ("road seen", road), "returns": ("returns", returns.problem())}
     plain = known.pop(criterion_of(objective, survey.models))
-    return [plain, *known.values(), ("returns in an empty street", replace(problem, amounts=returns.grid.returns))]
+    empty = replace(returns.problem(), amounts=returns.grid.returns)
+    return [plain, *known.values(), ("returns in an empty street", empty)]
 
 
-def _road(survey: Survey, objective: Objective) -> PlacementProblem:
-    return placement_problem(survey.site, survey.grid.visible, survey.models, objective)
-
-
-def _near(site: Site, base: Finalist, first: int) -> Iterator[Finalist]:
-    """Yield placements near one, the best by its criterion first: with another pose, or another position, in turn.
+def _near(
+    site: Site, name: str, chosen: Integer, problem: PlacementProblem, first: int
+) -> Iterator[tuple[str, Integer, PlacementProblem]]:
+    """Yield placements near one, best first: with another pose, or another position, of one sensor in turn.
 
     Parameters
     ----------
     first : {0, 1}
         Whether another position comes first.
     """
-    problem, candidates = base.problem, site.candidates
-    kinds: tuple[list[tuple[float, int, int]], ...] = ([], [])  # value less than 0, slot, candidate
-    for slot, gone in enumerate(base.chosen.tolist()):
-        rest = np.delete(base.chosen, slot)
+    candidates = site.candidates
+    kinds: tuple[list[tuple[float, int, int]], ...] = ([], [])
+    for gone in chosen.tolist():
+        rest = chosen[chosen != gone]
         together = problem.amounts[rest].sum(axis=0, dtype=np.float64)
         same = problem.positions == problem.positions[gone]
         same[gone] = False
         far = np.hypot(*(problem.xyz[:, :2] - problem.xyz[gone, :2]).T) >= MOVED_BY
         for kind, mask in zip(kinds, (same, far), strict=True):
             for one in np.flatnonzero(mask & _fits(problem, rest)).tolist():
-                value = float(problem.weights @ problem.g(together + problem.amounts[one]))
-                kind.append((-value, slot, one))
-    lists = [sorted(kind) for kind in (kinds[first], kinds[1 - first])]
-    for _, slot, one in filter(None, chain.from_iterable(zip_longest(*lists))):
+                kind.append((-float(problem.weights @ problem.g(together + problem.amounts[one])), gone, one))
+    lists = (sorted(kinds[first]), sorted(kinds[1 - first]))
+    for _, gone, one in filter(None, chain.from_iterable(zip_longest(*lists))):
         place = f"{candidates.position_name[candidates.position_of[one]]} at {candidates.height[one]:g} m"
-        chosen = _in_order(problem, np.append(np.delete(base.chosen, slot), one))
-        yield Finalist(f"{base.name}, but {place}", chosen, problem)
+        yield f"{name}, but {place}", np.sort(np.append(chosen[chosen != gone], one)), problem
 
 
 def _fits(problem: PlacementProblem, rest: Integer) -> Boolean:
@@ -186,11 +230,5 @@ def _fits(problem: PlacementProblem, rest: Integer) -> Boolean:
     return fits
 
 
-def _in_order(problem: PlacementProblem, chosen: Integer) -> Integer:
-    """Return candidates in the canonical order."""
-    rank = np.argsort(canonical_order(problem))
-    return chosen[np.argsort(rank[chosen])]
-
-
-def _key(chosen: Integer) -> frozenset[int]:
-    return frozenset(chosen.tolist())
+def _sensors(survey: Survey, chosen: Integer) -> tuple[RecordedSensor, ...]:
+    return tuple(recorded_sensor(sensor, survey.site) for sensor in survey.deploy(chosen).sensors)

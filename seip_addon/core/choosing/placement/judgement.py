@@ -12,14 +12,7 @@ MEAN = "mean"
 
 @dataclass(frozen=True)
 class Figure:
-    """Average precision, or a difference of two.
-
-    Parameters
-    ----------
-    value : float, 0 to 1
-    interval : (float, float) or None
-        95 % interval over runs of traffic; None if there are too few.
-    """
+    """Average precision, or a difference of two, with its 95 % interval over runs; None if there are too few runs."""
 
     value: float
     interval: Interval | None = None
@@ -39,99 +32,75 @@ class Figure:
 
 @dataclass(frozen=True)
 class JudgedFinalist:
-    """A finalist in the frames by which the winner was chosen.
+    """A placement that was judged.
 
     Parameters
     ----------
     name : str
         The criterion of which it is best, or the finalist that it is near.
-    sensors : tuple of str
-        Positions and heights.
+    places : tuple of str
+        Positions and heights of its sensors.
     poses : tuple of int
         Rows of the visibility grid.
     frames : int
-        Frames until it was behind, or all.
+        Frames of the choice until it was behind, or all.
     precision : mapping of str to Figure
         Average precision by class of road users, and `MEAN`, in these frames.
+    final : mapping of str to Figure, optional
+        The same in the runs that chose nothing, of the winner, the runner-up and the best by the criterion.
+    behind : Figure, optional
+        By how much the mean of the winner exceeds its mean in these runs.
     """
 
     name: str
-    sensors: tuple[str, ...]
+    places: tuple[str, ...]
     poses: tuple[int, ...]
     frames: int
     precision: Mapping[str, Figure]
-
-
-@dataclass(frozen=True)
-class FinalFigures:
-    """A finalist in runs that chose nothing.
-
-    Parameters
-    ----------
-    finalist : int
-        Its number in `Judgement.finalists`.
-    precision : mapping of str to Figure
-        Average precision by class of road users, and `MEAN`.
-    behind : Figure or None
-        By how much the mean of the winner exceeds its mean; None for the winner.
-    """
-
-    finalist: int
-    precision: Mapping[str, Figure]
+    final: Mapping[str, Figure] | None = None
     behind: Figure | None = None
 
 
 @dataclass(frozen=True)
 class Judgement:
-    """Finalists with what a detector finds with them; the first of `figures` is the winner.
+    """Finalists with what a detector finds with them.
 
     Parameters
     ----------
     finalists : tuple of JudgedFinalist
-        The first is the best by the criterion of the placement.
+        The winner first, then the runner-up.
+    plain : int
+        Number of the best by the criterion.
     weights : mapping of str to float
         Weight of each class of road users in the mean.
     judged_on, figures_on : tuple of str
         Runs by which the winner was chosen, and those of its figures.
-    figures : tuple of FinalFigures
-        Those of the winner, of the runner-up, and of the best by the criterion, each once.
     """
 
     finalists: tuple[JudgedFinalist, ...]
+    plain: int
     weights: Mapping[str, float]
     judged_on: tuple[str, ...]
     figures_on: tuple[str, ...]
-    figures: tuple[FinalFigures, ...]
 
     def __post_init__(self) -> None:
-        if not self.figures or not all(one.finalist in range(len(self.finalists)) for one in self.figures):
-            raise ValueError("the figures are not of finalists")
-        if not all(MEAN in one.precision for one in (*self.finalists, *self.figures)):
-            raise ValueError(f"average_precision.{MEAN} is missing")
-
-    @property
-    def winner(self) -> JudgedFinalist:
-        """The finalist with the largest mean average precision."""
-        return self.finalists[self.figures[0].finalist]
+        known = self.plain in range(len(self.finalists)) and self.finalists[0].final is not None
+        if not known or not all(MEAN in (one.final or one.precision) for one in self.finalists):
+            raise ValueError("the figures of the finalists are incomplete")
 
     def sentences(self) -> tuple[str, ...]:
         """Return how the winner was chosen, its average precision, and its lead, as sentences."""
-        winner, first = self.figures[0], self.finalists[0]
-        weights = list(self.weights.values())
+        winner, weights = self.finalists[0], list(self.weights.values())
         shares = f" weighted {' : '.join(f'{one:g}' for one in weights)}" if len(set(weights)) > 1 else ""
-        classes = ", ".join(f"{name} {one.describe()}" for name, one in winner.precision.items() if name != MEAN)
         chosen = (
-            f"Chosen by detection among {counted(len(self.finalists), 'finalist')} ({self.winner.name}): largest mean "
-            f"AP of {', '.join(self.weights)}{shares} in {counted(self.winner.frames, 'frame')} of "
+            f"Chosen by detection among {counted(len(self.finalists), 'finalist')} ({winner.name}): largest mean AP of "
+            f"{', '.join(self.weights)}{shares} in {counted(winner.frames, 'frame')} of "
             f"{counted(len(self.judged_on), 'run')}."
         )
-        mean = winner.precision[MEAN].describe()
-        lines = [chosen, f"AP in {counted(len(self.figures_on), 'other run')}: {classes}; mean {mean}."]
-        for one in self.figures[1:]:
-            name = self.finalists[one.finalist].name
-            other = f"the best by the criterion, {name}" if one.finalist == 0 else f"the runner-up, {name}"
-            lead = "" if one.behind is None else one.behind.describe_lead()
-            lines.append(f"Mean AP compared with {other}: {lead}.")
-        if winner.finalist == 0:
-            lines.append(f"It is the best by the criterion, {first.name}, too.")
-        return tuple(lines)
+        found = ", ".join(f"{name} {one.describe()}" for name, one in (winner.final or {}).items())
+        lines = [chosen, f"AP in {counted(len(self.figures_on), 'other run')}: {found}."]
+        for number, one in enumerate(self.finalists):
+            if one.behind is not None:
+                other = "best by the criterion" if number == self.plain else "runner-up"
+                lines.append(f"Mean AP compared with the {other}, {one.name}: {one.behind.describe_lead()}.")
+        return (*lines, *(["It is the best by the criterion, too."] if self.plain == 0 else []))

@@ -335,7 +335,7 @@ def placement_record(
         site=RecordedSite(
             site.name, _metres(site.origin), _geo_reference(site.geo_reference), site.sources, site.attribution
         ),
-        sensors=tuple(_sensor(sensor, site) for sensor in deployment.sensors),
+        sensors=tuple(recorded_sensor(sensor, site) for sensor in deployment.sensors),
         price_usd=_rounded(deployment.price, 2),
         coverage=RecordedCoverage(
             whole=_share(deployment.coverage),
@@ -387,7 +387,8 @@ def _geo_reference(known: GeoReference) -> RecordedGeoReference | None:
     )
 
 
-def _sensor(sensor: Sensor, site: Site) -> RecordedSensor:
+def recorded_sensor(sensor: Sensor, site: Site) -> RecordedSensor:
+    """Return the record of a sensor of a deployment on a site."""
     place = site.geographic(sensor.xyz[None])
     longitude, latitude, altitude = (None, None, None) if place is None else place[0]
     map_xyz = sensor.xyz + site.origin
