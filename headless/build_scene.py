@@ -2,6 +2,7 @@
 
 blender -b --python-exit-code 1 -P headless/build_scene.py -- map.xodr --near -49 -1 --radius 80 -o site.blend
 seip build-scene place.osm --near-latlon 52.47391,13.44048 -o site.blend
+seip build-scene --at 52.47391,13.44048 -o site.blend
 seip build-scene place.osm --junction "One Street" "Other Street" -o site.blend
 seip build-scene map.xodr --junction 53 --site site.toml -o site.blend
 seip build-scene site.toml -o site.blend
@@ -18,7 +19,7 @@ if not __package__:  # run as a file by `blender -P`
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from headless import runtime
-from headless.options import add_settings, new_parser
+from headless.options import NUMBER, add_settings, new_parser
 
 from seip_addon.core.counts import counted
 from seip_addon.core.errors import SeipError
@@ -31,6 +32,8 @@ from seip_addon.core.sumo_programs import NETWORK_SUFFIX
 from seip_addon.core.workflows.site_building import SiteRequest, build_site, save_map
 from seip_addon.core.world.elevation.at_place import TerrainRequest
 from seip_addon.core.world.elevation.obstacles import MAX_CHANGED, RAYS, Merging, chosen_merging
+from seip_addon.core.world.openstreetmap.map_links import parsed_position
+from seip_addon.core.world.openstreetmap.overpass import OVERPASS, OverpassServer, user_cache
 from seip_addon.scene.blend_file import check_name, new_file, save_blend
 from seip_addon.scene.build import build_scene
 
@@ -97,9 +100,12 @@ def _build(request: argparse.Namespace) -> None:
 
 
 def _asked_site(options: argparse.Namespace) -> SiteRequest:
+    near_latlon = None if options.near_latlon is None else tuple(options.near_latlon)
+    if options.at:
+        near_latlon = parsed_position(" ".join(options.at))
     return SiteRequest(
         near=None if options.near is None else tuple(options.near),
-        near_latlon=None if options.near_latlon is None else tuple(options.near_latlon),
+        near_latlon=near_latlon,
         junction=tuple(options.junction),
         radius=options.radius,
         approaches=options.approaches,
@@ -109,7 +115,20 @@ def _asked_site(options: argparse.Namespace) -> SiteRequest:
         terrain=None if options.terrain is None else TerrainRequest(options.terrain, options.terrain_epsg),
         service=options.service_roads,
         left_hand=None if options.traffic_keeps is None else options.traffic_keeps == "left",
+        overpass=_server(options) if options.at and options.source is None else None,
     )
+
+
+def _server(options: argparse.Namespace) -> OverpassServer:
+    return OverpassServer(user_cache(), options.overpass, runtime.why_offline())
+
+
+def _text_or_number(text: str) -> str:
+    """Return a text; the name of this type lets an option take numbers with commas, and negative ones."""
+    return text
+
+
+_text_or_number.__name__ = NUMBER
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -117,7 +136,9 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "source",
         type=Path,
-        help="map (.xodr), extract (.osm, .osm.gz, .osm.pbf) or site description (.toml) with the name of a map",
+        nargs="?",
+        help="map (.xodr), extract (.osm, .osm.gz, .osm.pbf) or site description (.toml) with the name of a map; "
+        "none with --at, to download an extract",
     )
     place = parser.add_mutually_exclusive_group()
     place.add_argument(
@@ -135,11 +156,21 @@ def _parser() -> argparse.ArgumentParser:
         help="latitude and longitude in degrees; the nearest junction is studied",
     )
     place.add_argument(
+        "--at",
+        type=_text_or_number,
+        nargs="+",
+        metavar="PLACE",
+        help="latitude and longitude, or a link of a web map in quotes; without a file the extract is downloaded",
+    )
+    place.add_argument(
         "--junction",
         nargs="+",
         default=[],
         metavar="NAME",
         help="id or name of the junction, or the names of two streets that meet there",
+    )
+    parser.add_argument(
+        "--overpass", default=OVERPASS, metavar="URL", help="Overpass server that extracts are downloaded from"
     )
     size = parser.add_mutually_exclusive_group()
     size.add_argument("--radius", type=float, help="radius of the region of interest in metres (80 with --near)")

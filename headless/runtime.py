@@ -65,6 +65,13 @@ def in_blender() -> bool:
     return not bpy.app.module
 
 
+def why_offline() -> str:
+    """Return why nothing may be downloaded, or "": Blender asks its user; Python has been told by the command."""
+    if in_blender() and not bpy.app.online_access:
+        return "Blender may not go online: start it with --online-mode, or switch on Allow Online Access in Preferences"
+    return ""
+
+
 def arguments(argv: Sequence[str] | None = None) -> list[str]:
     """Return the command's own arguments: in Blender those after ``--``, else all but the first."""
     given = list(sys.argv if argv is None else argv)

@@ -17,11 +17,13 @@ from .core.sensing.visibility.store import GridFolder
 from .core.sumo_installation import BY_HAND, installed_sumo
 from .core.sumo_programs import Sumo, find_sumo, sumo_version
 from .core.workflows.detection import DetectingPython
+from .core.world.openstreetmap.overpass import EXPORT, OVERPASS, OverpassServer
 
 ADDON_ID = (__package__ or "").removesuffix(".seip_addon")
 """The extension's key among Blender's add-ons: not that of the package in it."""
 NO_SUMO = "SUMO is missing, which lays out the streets of an extract and simulates traffic"
-OFFLINE = f"Blender may not go online: switch on Allow Online Access in Preferences, System, or {BY_HAND}"
+_OFFLINE = "Blender may not go online: switch on Allow Online Access in Preferences, System,"
+OFFLINE = f"{_OFFLINE} or {BY_HAND}"
 NO_PIP = f"This Blender has no pip to install SUMO with: {BY_HAND}"
 
 
@@ -103,6 +105,18 @@ def why_no_installation() -> str:
     if not bpy.app.online_access:
         return OFFLINE
     return "" if pip() else NO_PIP
+
+
+def why_no_download() -> str:
+    """Return why no extract can be downloaded, or ""."""
+    return "" if bpy.app.online_access else f"{_OFFLINE} {EXPORT}"
+
+
+def overpass() -> OverpassServer:
+    """Return the server that extracts are downloaded from; without one of the user's own the public one."""
+    preferences = own()
+    address = OVERPASS if preferences is None else preferences.overpass or OVERPASS
+    return OverpassServer(_own_folder("openstreetmap"), address, why_no_download())
 
 
 def cores() -> int | None:

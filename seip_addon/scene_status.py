@@ -61,7 +61,9 @@ def next_step(scene: bpy.types.Scene) -> str:
     if scene.seip.result.record:
         return "seip.solve_placement" if other_goal(scene) else ""
     if obstacle(scene):
-        return "seip.build_site" if site.has_place() else "seip.choose_map"
+        if site.has_place():
+            return "seip.build_site"
+        return "seip.download_map" if site.new_site and not site.source else "seip.choose_map"
     if not site.checked:
         return "seip.check_site"
     return "seip.solve_placement" if scene.seip.survey.used_types() else "seip.choose_sensors"

@@ -171,13 +171,17 @@ def within(whole: Progress, steps: Generator[Progress, None, Result]) -> Generat
         yield replace(whole, best=step.best, gap=step.gap)
 
 
-def in_thread(work: Callable[[threading.Event], Result], what: str) -> Generator[Progress, None, Result]:
+def in_thread(
+    work: Callable[[threading.Event], Result], what: str | Callable[[], Progress]
+) -> Generator[Progress, None, Result]:
     """Run work that cannot yield, such as a call of a library, in a separate thread.
 
     Parameters
     ----------
     work : callable
         Function to call with an event. When the event is set, the result is not needed any more and it should return.
+    what : str or callable
+        Description of the work, or a function that returns its progress.
 
     Yields
     ------
@@ -198,7 +202,7 @@ def in_thread(work: Callable[[threading.Event], Result], what: str) -> Generator
     try:
         while thread.is_alive():
             thread.join(REPORT_INTERVAL)
-            yield Progress(0, 0, what)
+            yield Progress(0, 0, what) if isinstance(what, str) else what()
         return result.result()
     finally:
         stop.set()

@@ -17,10 +17,11 @@ from ..core.site.roles import Role
 from ..core.site.scene_geometry import SceneGeometry
 from ..core.site.site import Site
 from ..core.sumo_programs import NETWORK_SUFFIX
-from ..core.workflows.site_building import BuiltSite, SiteRequest, build_site
+from ..core.workflows.site_building import BuiltSite, SiteRequest, build_site, site_source
 from ..core.workflows.site_places import SitePlaces, site_places
 from ..core.workflows.survey import lay_out
 from ..core.workflows.survey_settings import SurveySettings
+from ..core.world.openstreetmap.map_links import parsed_position
 from ..core.world.streetscape.description import DESCRIPTION_SUFFIX
 from ..properties import traffic
 from ..properties.conversion import absolute
@@ -39,6 +40,7 @@ EXAMPLE = Path(__file__).resolve().parents[2] / "scenes" / f"junction{DESCRIPTIO
 """The site that comes with SEIP: beside the package, in a checkout as in the extension."""
 EXTRACTS = "*.osm;*.osm.gz;*.osm.pbf"
 """Files of OpenStreetMap, as the file browser filters them."""
+NO_NEW_SITE = "Paste latitude and longitude, or a link of a web map, into New Site"
 NO_PLACE = "Choose a junction, or give latitude and longitude"
 COPIED = ("source", "position", "region_shape", "radius", "osm", "terrain", "terrain_epsg")
 """Properties of a choice that a site in a new scene takes over."""
@@ -91,19 +93,9 @@ class SEIP_OT_choose_map(_WritesScene, LongWork[SitePlaces], bpy.types.Operator)
 
     def conclude(self, scene: bpy.types.Scene, result: SitePlaces) -> None:
         """List the junctions in place of those of another file, and ask for the place."""
-        site, before = scene.seip.site, ""
-        if site.source == self.filepath:
-            before = site.junction  # it stays until another one is chosen
-        else:
-            site.radius, site.position = result.radius, ""
-        site.source, site.junction = self.filepath, ""
-        site.junctions.clear()
-        for place in result.places:
-            one = site.junctions.add()
-            one.name, one.id = place.name, place.key
-        site.junction = before if before in site.junctions else ""
+        site = scene.seip.site
+        _list_places(site, self.filepath, result)
         self.report({"INFO"}, counted(len(site.junctions), "junction"))
-        session.places = result
         if self.by_hand and not bpy.app.background:
             self._ask(site, result)
 
@@ -115,6 +107,55 @@ class SEIP_OT_choose_map(_WritesScene, LongWork[SitePlaces], bpy.types.Operator)
             bpy.ops.seip.pick_junction("INVOKE_DEFAULT")
             return
         bpy.ops.seip.choose_place("INVOKE_DEFAULT")
+
+
+def _list_places(site: SEIP_PG_site, source: str, places: SitePlaces) -> None:
+    """List the junctions of a file in place of those of another one."""
+    before = ""
+    if site.source == source:
+        before = site.junction  # it stays until another one is chosen
+    else:
+        site.radius, site.position = places.radius, ""
+    site.source, site.junction = source, ""
+    site.junctions.clear()
+    for place in places.places:
+        one = site.junctions.add()
+        one.name, one.id = place.name, place.key
+    site.junction = before if before in site.junctions else ""
+    session.places = places
+
+
+class SEIP_OT_download_map(_WritesScene, LongWork[tuple[Path, SitePlaces]], bpy.types.Operator):
+    """Download the streets, buildings and trees around the place from OpenStreetMap, and choose the place there. A download of the same day is used again"""  # noqa: E501  # a tooltip is one line
+
+    bl_idname = "seip.download_map"
+    bl_label = "Download Map"
+    stopped_message = "stopped; nothing was downloaded"
+
+    @classmethod
+    def why_not(cls, context: bpy.types.Context) -> str:
+        """Return a reason if there is no place, or Blender may not go online."""
+        place = "" if context.scene.seip.site.new_site else NO_NEW_SITE
+        return super().why_not(context) or place or preferences.why_no_download()
+
+    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, tuple[Path, SitePlaces]]:
+        """Take the position, for a site of the usual size: a larger one downloads more when it is built."""
+        self._near = parsed_position(scene.seip.site.new_site)
+        return _downloaded(SiteRequest(near_latlon=self._near, overpass=preferences.overpass()))
+
+    def conclude(self, scene: bpy.types.Scene, result: tuple[Path, SitePlaces]) -> None:
+        """List the junctions, and choose the position."""
+        path, places = result
+        site = scene.seip.site
+        _list_places(site, str(path), places)
+        site.junction, site.position = "", "{:.6f}, {:.6f}".format(*self._near)
+        self.report({"INFO"}, counted(len(site.junctions), "junction"))
+
+
+def _downloaded(request: SiteRequest) -> Generator[Progress, None, tuple[Path, SitePlaces]]:
+    """Download an extract, and list its junctions."""
+    path = yield from site_source(request)
+    return path, (yield from site_places(path))
 
 
 class _BuildsSite(_WritesScene, LongWork[BuiltSite]):
@@ -459,6 +500,7 @@ def _frame_selected(context: bpy.types.Context) -> None:
 
 CLASSES = (
     SEIP_OT_choose_map,
+    SEIP_OT_download_map,
     SEIP_OT_build_site,
     SEIP_OT_load_example,
     SEIP_OT_assign_role,

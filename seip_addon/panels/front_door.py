@@ -17,6 +17,7 @@ from ..operators.site import (
     SEIP_OT_build_site,
     SEIP_OT_check_site,
     SEIP_OT_choose_map,
+    SEIP_OT_download_map,
     SEIP_OT_load_example,
     missing_for_build,
 )
@@ -105,7 +106,7 @@ class SEIP_MT_main(bpy.types.Menu):
 
 
 STEPS: tuple[tuple[type[bpy.types.Operator], ...], ...] = (
-    (SEIP_OT_load_example, SEIP_OT_choose_map, SEIP_OT_build_site, SEIP_OT_check_site),
+    (SEIP_OT_load_example, SEIP_OT_download_map, SEIP_OT_choose_map, SEIP_OT_build_site, SEIP_OT_check_site),
     (SEIP_OT_add_catalogue, SEIP_OT_preview_beams, SEIP_OT_compute_visibility, SEIP_OT_solve_placement),
     (SEIP_OT_evaluate_sensors, SEIP_OT_export_result),
     (SEIP_OT_colour_coverage, SEIP_OT_save_picture),

@@ -4,6 +4,7 @@ import bpy
 
 from .. import preferences
 from ..core.sensing.visibility.ray_casting import MAX_THREADS
+from ..core.world.openstreetmap.overpass import OVERPASS
 from . import sumo
 
 
@@ -45,6 +46,11 @@ class SEIP_AP_preferences(bpy.types.AddonPreferences):
         "traffic: the one with bin and data in it. Empty for the SUMO that was installed here, on the PATH or in "
         "SUMO_HOME",
     )
+    overpass: bpy.props.StringProperty(
+        name="Overpass",
+        description="Address of the Overpass server that extracts of OpenStreetMap are downloaded from",
+        default=OVERPASS,
+    )
     catalogues: bpy.props.CollectionProperty(type=SEIP_PG_catalogue_file)
 
     def draw(self, _context: bpy.types.Context) -> None:
@@ -59,6 +65,7 @@ class SEIP_AP_preferences(bpy.types.AddonPreferences):
         layout.prop(self, "python")
         layout.prop(self, "sumo")
         sumo.draw_status(layout)
+        layout.prop(self, "overpass")
         layout.label(text="Catalogues of sensor types")
         for number, file in enumerate(self.catalogues):
             row = layout.row(align=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bpy
 
-from .. import scene_status
+from .. import preferences, scene_status
 from ..core.site.roles import Role
 from ..operators.site import (
     SEIP_OT_add_area,
@@ -12,6 +12,7 @@ from ..operators.site import (
     SEIP_OT_build_site,
     SEIP_OT_check_site,
     SEIP_OT_choose_map,
+    SEIP_OT_download_map,
     SEIP_OT_load_example,
     SEIP_OT_show_problem,
     SEIP_OT_take_out_of_role,
@@ -46,7 +47,8 @@ def draw(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     """Draw the choice of a map while there is no site, otherwise the check and its problems."""
     scene = context.scene
     if scene_status.has_nothing(scene):
-        draw_sentence(layout, "Choose a map, load the example, or give roles to your own objects.", icon="INFO")
+        ways = "Paste a place, choose a map, load the example, or give roles to your own objects."
+        draw_sentence(layout, ways, icon="INFO")
         _draw_map(layout, scene)
         draw_run(layout, SEIP_OT_load_example.bl_idname, icon="MOD_BUILD")
     else:
@@ -58,6 +60,7 @@ def draw(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
 def _draw_map(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
     site = scene.seip.site
     name = bpy.path.basename(site.source)
+    _draw_download(layout, site)
     draw_run(layout, SEIP_OT_choose_map.bl_idname, icon="FILE_FOLDER", text=name or "Choose Map…")
     if not name:
         return
@@ -69,6 +72,18 @@ def _draw_map(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
         elsewhere = "The site is built in a new scene; this one stays."
         draw_sentence(layout, again if is_of_choice(scene) else elsewhere, icon="INFO")
     draw_run(layout, SEIP_OT_build_site.bl_idname)
+
+
+def _draw_download(layout: bpy.types.UILayout, site: SEIP_PG_site) -> None:
+    """Draw the field for the position of a new site, and the button that downloads its surroundings."""
+    row = settings_column(layout).row()
+    row.alert = bool(site.new_site and site.wrong_position(site.new_site))
+    row.prop(site, "new_site")
+    if site.new_site:
+        reason = preferences.why_no_download()
+        if reason:
+            draw_sentence(layout, f"{reason}.", icon="ERROR")
+        draw_run(layout, SEIP_OT_download_map.bl_idname, icon="WORLD")
 
 
 def draw_pick(layout: bpy.types.UILayout, site: SEIP_PG_site) -> None:
@@ -92,7 +107,7 @@ def draw_place(layout: bpy.types.UILayout, site: SEIP_PG_site, width: float | No
     if site.is_extract():
         row = column.row()
         row.enabled = not site.junction
-        row.alert = bool(not site.junction and site.position and site.wrong_position())
+        row.alert = bool(not site.junction and site.position and site.wrong_position(site.position))
         row.prop(site, "position")
     size = column.column()
     size.enabled = not site.is_described()

@@ -17,11 +17,11 @@ from bpy.props import (
 from ..core.errors import SeipError
 from ..core.site.scene_geometry import DEFAULT_WEIGHT
 from ..core.workflows.site_building import SiteRequest
-from ..core.workflows.site_places import parsed_position
 from ..core.world.elevation.at_place import TerrainRequest
+from ..core.world.openstreetmap.map_links import parsed_position
 from ..core.world.openstreetmap.site import is_extract
 from ..core.world.streetscape.description import DEFAULT_RADIUS, DESCRIPTION_SUFFIX
-from ..preferences import sumo_folders
+from ..preferences import overpass, sumo_folders
 from ..scene import contract, roles
 from .conversion import absolute, as_typed, of_setting
 
@@ -59,6 +59,11 @@ class SEIP_PG_site(bpy.types.PropertyGroup):
         description="OpenDRIVE map, site description that names one, or extract of OpenStreetMap",
         subtype="FILE_PATH",
         options={"PATH_SUPPORTS_BLEND_RELATIVE"},
+    )
+    new_site: StringProperty(
+        name="New Site",
+        description="Position of a place whose streets are downloaded from OpenStreetMap: latitude and longitude in "
+        "degrees, or a link of OpenStreetMap, Google, Bing or Apple maps",
     )
     junctions: CollectionProperty(type=SEIP_PG_junction)
     junction: StringProperty(
@@ -104,10 +109,10 @@ class SEIP_PG_site(bpy.types.PropertyGroup):
         """Return whether the site comes from an extract of OpenStreetMap."""
         return is_extract(Path(self.source))
 
-    def wrong_position(self) -> str:
-        """Say what is wrong with latitude and longitude, or nothing."""
+    def wrong_position(self, text: str) -> str:
+        """Return what is wrong with a position, or ""."""
         try:
-            parsed_position(self.position)
+            parsed_position(text)
         except SeipError as error:
             return str(error)
         return ""
@@ -141,7 +146,8 @@ class SEIP_PG_site(bpy.types.PropertyGroup):
             junction = (chosen,) if chosen else ()
             return SiteRequest(junction=junction, radius=radius, approaches=approaches, anywhere=True, **more)
         near = parsed_position(chosen or self.position)
-        return SiteRequest(near_latlon=near, radius=radius, approaches=approaches, sumo=sumo_folders(), **more)
+        more |= {"sumo": sumo_folders(), "overpass": overpass()}
+        return SiteRequest(near_latlon=near, radius=radius, approaches=approaches, **more)
 
     def _sources(self) -> dict[str, Any]:
         """Return the fields of the request that name further files."""

@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 from headless import network
 
@@ -17,6 +18,7 @@ from seip_addon.core.output.network.network_record import NetworkRecord
 from seip_addon.core.storage.json_dataclass import from_json
 from tests.builders.small_scene import save_small_scene
 
+JUNCTION = Path(__file__).parents[2] / "scenes" / "junction.blend"
 TYPES = ("--sensor", "type1", "type2", "--heights", "4", "--grid", "4", "--spacing", "25")
 
 
@@ -56,20 +58,27 @@ def test_budget_goes_to_the_heavier_site_and_an_interrupted_run_resumes_beside_a
     table, tmp_path, capsys
 ):
     output, goal = tmp_path / "city", ("--budget", "20_000", "--gap", "0")
-    command = [sys.executable, "-m", "headless.network", str(table), "-o", str(output), "--workers", "1", *TYPES, *goal]
+    more = tmp_path / "more.csv"
+    rows = "".join(f"{JUNCTION},{54 + number / 100:.2f},7.4,Further {number},1\n" for number in range(12))
+    sites = table.read_text(encoding="utf-8").replace("broken.blend,54.28,7.4,Broken,1\n", rows)
+    more.write_text(sites, encoding="utf-8")
+    command = [sys.executable, "-m", "headless.network", str(more), "-o", str(output), "--workers", "1", *TYPES, *goal]
     started = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, start_new_session=True)  # noqa: S603
     while not list(output.glob("*/problem.npz")):
         assert started.poll() is None
-        time.sleep(0.1)
+        time.sleep(0.01)
     os.killpg(started.pid, signal.SIGINT)  # as a terminal does
     _, said = started.communicate(timeout=60)
     assert started.returncode == 130
     assert "Traceback" not in said
     assert "are kept in" in said
-    (kept,) = output.glob("*/problem.npz")
-    stamp = kept.stat().st_mtime_ns
+    assert len(list(output.glob("*/problem.npz"))) < 14
+    for further in output.glob("further*"):
+        shutil.rmtree(further)
+    kept = {path: path.stat().st_mtime_ns for path in output.glob("*/problem.npz")}
+    assert kept
     first = run(table, output, *goal)
-    assert kept.stat().st_mtime_ns == stamp
+    assert kept == {path: path.stat().st_mtime_ns for path in kept}
     assert first.bound == pytest.approx(first.value)
     assert first.price_usd <= 20_000
     north, south, broken = first.sites

@@ -23,8 +23,10 @@ from ..world.opendrive.lanes import lane_surfaces
 from ..world.opendrive.read import read_map
 from ..world.opendrive.road_map import RoadMap
 from ..world.openstreetmap.network_map import credited
+from ..world.openstreetmap.overpass import OverpassServer, download_extract, is_outgrown
 from ..world.openstreetmap.site import (
     STANDS_AROUND,
+    STREET_REACH,
     ExtractPlace,
     is_extract,
     place_on_map,
@@ -38,6 +40,8 @@ from ..world.streetscape.levels import UnclearLevelError
 from ..world.streetscape.model import SiteModel, street_model
 from ..world.streetscape.place import SCENE_MARGIN, Place
 from ..world.streetscape.street_map import StreetMap, opendrive_streets
+
+DOWNLOAD_MARGIN = 200.0  # metres beyond the streets that are laid out: `site_of_extract` reads no more
 
 
 @dataclass(frozen=True)
@@ -70,6 +74,8 @@ class SiteRequest:
         Whether to use the centre of a map if no position is given.
     sumo : tuple of Path
         Folders to search for SUMO first, which lays out the streets of an extract.
+    overpass : OverpassServer or None
+        Server to download an extract around ``near_latlon`` from, where there is none that contains the place.
     """
 
     near: tuple[float, float] | None = None
@@ -87,6 +93,20 @@ class SiteRequest:
     left_hand: bool | None = None
     anywhere: bool = False
     sumo: tuple[Path, ...] = ()
+    overpass: OverpassServer | None = None
+
+    @property
+    def extract_place(self) -> ExtractPlace:
+        """The place that is studied, in an extract."""
+        return ExtractPlace(
+            near=self.near_latlon,
+            streets=self.junction,
+            radius=self.radius,
+            approaches=self.approaches,
+            service=self.service,
+            left_hand=self.left_hand,
+            level=self.level,
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,23 +131,25 @@ class BuiltSite:
 
 
 def build_site(
-    source: Path, request: SiteRequest, map_path: Path | None = None
+    source: Path | None, request: SiteRequest, map_path: Path | None = None
 ) -> Generator[Progress, None, BuiltSite]:
     """Build the model of a site.
 
     Parameters
     ----------
-    source : Path
-        OpenDRIVE map, extract of OpenStreetMap, or site description that names a map.
+    source : Path or None
+        OpenDRIVE map, extract of OpenStreetMap, or site description that names a map; None to download an extract.
     map_path : Path, optional
         File for the map of an extract's streets, which is written if a user must choose a level on it.
 
     Raises
     ------
     SeipError
-        A file cannot be read or does not contain the position, or the level is not clear.
+        A file cannot be read or does not contain the position, the level is not clear, or an extract cannot be
+        downloaded.
     """
     yield Progress(0, 0, "map")
+    source = yield from site_source(request, source)
     if is_extract(source):
         return (yield from _of_extract(source, request, map_path))
     map_path, road_map, description = _of_map(source, request)
@@ -140,6 +162,31 @@ def build_site(
     description, more, merging = yield from _with_terrain(streets, description, request)
     model = yield from street_model(streets, description)
     return BuiltSite(map_path.name, replace(model, notes=(*notes, *more, *model.notes)), None, merging, map_path)
+
+
+def site_source(request: SiteRequest, source: Path | None = None) -> Generator[Progress, None, Path]:
+    """Return the file to build a site from: the source, or an extract from a server.
+
+    Parameters
+    ----------
+    source : Path, optional
+        File that was chosen. An extract from a server is used if there is none, or if it is an earlier download that
+        was deleted or does not contain the whole place.
+
+    Raises
+    ------
+    SeipError
+        There is no source, and the request names no place or no server, or the extract cannot be downloaded.
+    """
+    near = request.near_latlon
+    if near is None or request.overpass is None:
+        if source is None:
+            raise SeipError("no map is named: give a map or an extract, or --at LAT,LON to download one")
+        return source
+    reach = max(request.extract_place.reach, 0.0) + STREET_REACH + DOWNLOAD_MARGIN
+    if source is not None and not is_outgrown(source, near, reach):
+        return source
+    return (yield from download_extract(near, reach, request.overpass))
 
 
 def save_map(built: BuiltSite, path: Path) -> None:
@@ -164,17 +211,9 @@ def _of_extract(source: Path, request: SiteRequest, map_path: Path | None) -> Ge
         raise SeipError(f"{source.name} is an extract of OpenStreetMap: give its position by --near-latlon LAT LON")
     if len(request.junction) == 1:
         raise SeipError(f'a junction of {source.name} needs two streets: give --junction "One Street" "Other Street"')
-    place = ExtractPlace(
-        near=request.near_latlon,
-        streets=request.junction,
-        radius=request.radius,
-        approaches=request.approaches,
-        service=request.service,
-        left_hand=request.left_hand,
-        level=request.level,
-    )
     with tempfile.TemporaryDirectory() as folder:
-        site = yield from site_of_extract(source, place, Path(folder) / "streets.net.xml", request.sumo)
+        network = Path(folder) / "streets.net.xml"
+        site = yield from site_of_extract(source, request.extract_place, network, request.sumo)
     found = site.description
     _, described = describe_place(source, site=request.site)
     description = replace(

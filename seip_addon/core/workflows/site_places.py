@@ -1,25 +1,21 @@
 """Places of a file at which a site can be built, for a user to choose from."""
 
-import re
 from collections.abc import Generator
 from dataclasses import dataclass
 from pathlib import Path
 
 from ..distinct_names import distinct_names
-from ..errors import SeipError
 from ..progress import Progress
 from ..world.opendrive.junctions import STREETS, streets_of_junctions
 from ..world.opendrive.lanes import LaneSurface, lane_surfaces
 from ..world.opendrive.read import read_map
 from ..world.openstreetmap.crossings import Crossing, named_crossings
-from ..world.openstreetmap.extract import MAX_LATITUDE, read_extract
+from ..world.openstreetmap.extract import read_extract
 from ..world.openstreetmap.site import is_extract
 from ..world.openstreetmap.street_plan import StreetPlan, street_plan
 from ..world.streetscape.description import DEFAULT_RADIUS, describe_place
 
 ROADS_PER_STEP = 20
-_NUMBER = r"[+-]?\d+(?:\.\d*)?"
-_POSITION = re.compile(rf"\s*({_NUMBER})\s*°?\s*[,;\s]\s*({_NUMBER})\s*°?\s*")
 
 
 @dataclass(frozen=True)
@@ -92,26 +88,6 @@ def site_places(source: Path) -> Generator[Progress, None, SitePlaces]:
         NamedPlace(name, one.id) for name, one in zip(distinct_names(named, "{} ({})"), junctions, strict=True)
     )
     return SitePlaces(description.radius or DEFAULT_RADIUS, places)
-
-
-def parsed_position(text: str) -> tuple[float, float]:
-    """Return latitude and longitude, degrees, from a text such as ``52.47391, 13.44048``.
-
-    Raises
-    ------
-    SeipError
-        The text is not a position.
-    """
-    found = _POSITION.fullmatch(text)
-    if found is None:
-        raise SeipError(f"{text!r} is not a position: give latitude and longitude in degrees, like 52.47391, 13.44048")
-    latitude, longitude = float(found[1]), float(found[2])
-    if abs(latitude) > MAX_LATITUDE or abs(longitude) > 180.0:
-        raise SeipError(
-            f"{text!r} is not a position with streets: give the latitude first, up to {MAX_LATITUDE:g} degrees, then "
-            "the longitude, up to 180"
-        )
-    return latitude, longitude
 
 
 def _position(crossing: Crossing) -> str:

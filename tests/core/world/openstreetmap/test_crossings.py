@@ -5,10 +5,11 @@ from pathlib import Path
 import pytest
 
 from seip_addon.core.progress import finish
-from seip_addon.core.workflows.site_places import parsed_position, site_places
+from seip_addon.core.workflows.site_places import site_places
 from seip_addon.core.world.openstreetmap import extract as reading
 from seip_addon.core.world.openstreetmap.crossings import named_crossings
 from seip_addon.core.world.openstreetmap.extract import read_extract
+from seip_addon.core.world.openstreetmap.map_links import parsed_position
 from tests.builders.osm_text import JUNCTIONS, crossing
 
 SCENES = Path(__file__).resolve().parents[4] / "scenes"

@@ -7,9 +7,10 @@ import pytest
 
 from seip_addon.core.geometry.geo_reference import TransverseMercator
 from seip_addon.core.progress import finish
-from seip_addon.core.workflows.site_places import parsed_position, site_places
+from seip_addon.core.workflows.site_places import site_places
 from seip_addon.core.world.openstreetmap.crossings import named_crossings
 from seip_addon.core.world.openstreetmap.extract import read_extract
+from seip_addon.core.world.openstreetmap.map_links import parsed_position
 from seip_addon.core.world.openstreetmap.street_plan import street_plan
 from tests.builders.osm_text import Extract, crossing
 
