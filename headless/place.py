@@ -133,7 +133,8 @@ def main(argv: list[str]) -> None:
         runtime.LOG.info(runs.overlap)
     acceptance = runtime.accepted_by_enter()
     solution = watch.run("placement", place(surveyed, objective, runs, acceptance))
-    runtime.print_line(_describe(solution))
+    if options.finalists is None:
+        runtime.print_line(_describe(solution))
     solution = watch.run("fewer and more sensors", with_context(surveyed, solution, acceptance))
     if options.finalists is not None:
         solution = judge(surveyed, watch, solution, options)
