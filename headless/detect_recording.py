@@ -28,6 +28,7 @@ from headless.detection.pillars import grid_over
 from headless.detection.rules import MAIN_RULE
 from headless.detection.settings import BOTTOM, CLASS_CATEGORIES, CLASS_OF, TOP
 from headless.detection.suitability import suitability_warnings
+from headless.detection.traffic_ground import apart, moved_ground
 from headless.detection.training import deterministic
 from headless.detection_results import print_precision, save_charts, save_detections
 from headless.options import real_number
@@ -38,9 +39,9 @@ import shapely
 from PIL import Image
 from shapely.geometry.base import BaseGeometry
 
-from seip_addon.core.arrays import Float
+from seip_addon.core.arrays import Boolean, Float
 from seip_addon.core.errors import SeipError
-from seip_addon.core.geometry.plan import surface_height
+from seip_addon.core.geometry.plan import outline, surface_height
 from seip_addon.core.limits import Limits
 from seip_addon.core.output.datasets.label_files import CLASSES, read_labels
 from seip_addon.core.output.results.detection_record import RECORDING_SCHEMA
@@ -138,7 +139,7 @@ _LISTED_OVERLAP, _LISTED_RETURNS = 0.5, 10  # at which listed vehicles count as 
 
 _COLUMNS = (
     *("frame", "time_s", "category", "score"),
-    *("x_m", "y_m", "z_m", "length_m", "width_m", "height_m", "yaw_deg"),
+    *("x_m", "y_m", "z_m", "length_m", "width_m", "height_m", "yaw_deg", "apart"),
 )
 
 
@@ -217,7 +218,8 @@ def detect_recording(options: argparse.Namespace, detector: Detector) -> None:
     runtime.warn(doubts)
     pictures = [folder / "frames" / f"{number:06d}.png" for number in range(len(frames))]
     save_video(folder / "video.mp4", pictures, _rate(frames))
-    listed = _save_table(folder / "detections.csv", results, RECOMMENDED_SCORE, sensors.geometry)
+    beside = _apart(results, sensors.geometry)
+    listed = _save_table(folder / "detections.csv", results, beside, sensors.geometry)
     outcome = _evaluated(results, fullest, scan) if labels is not None else None
     record: dict[str, Any] = {
         "schema": RECORDING_SCHEMA,
@@ -241,6 +243,7 @@ def detect_recording(options: argparse.Namespace, detector: Detector) -> None:
             for one in frames.sensors
         ],
         "score": RECOMMENDED_SCORE,
+        "apart": int(sum(one.sum() for one in beside)),
         "detector": detector.description() | {"digest": digest(options.detector.read_bytes())},
         "warnings": doubts,
         "versions": versions(blender=bpy.app.version_string),
@@ -254,6 +257,9 @@ def detect_recording(options: argparse.Namespace, detector: Detector) -> None:
         _print_listed(record["listed"])
     save_json(folder / RECORD, record)
     runtime.print_line(f"{listed:,} road users with a score of {RECOMMENDED_SCORE:g} or more in {len(frames):,} frames")
+    if record["apart"]:
+        ground = "off the scene's road" if sensors.geometry else "standing where no vehicle was seen to move"
+        runtime.print_line(f"{record['apart']:,} of them are vehicles {ground}, often false: column apart")
     runtime.print_line(f"written to {folder}/: detections.csv, video.mp4, frames/, kitti/, openpcdet/")
 
 
@@ -439,8 +445,23 @@ def _save_frame(  # what was found where, and how it is shown
     save_detections(options.output, number, found.boxes, categories, found.score)
 
 
-def _save_table(path: Path, results: Sequence[FrameResult], score: float, geometry: SceneGeometry | None) -> int:
-    """Write detections with some score as CSV and return their number.
+def _apart(results: Sequence[FrameResult], geometry: SceneGeometry | None) -> list[Boolean]:
+    """Return for each frame which of its listed detections (k,) are vehicles beside the ground of traffic.
+
+    That is the road of the scene, and where vehicles were seen to move. None are if that cannot be seen.
+    """
+    ground = moved_ground(results, RECOMMENDED_SCORE)
+    if geometry is not None:
+        ground = ground.union(outline(joined(geometry.roads)))
+    elif ground.is_empty:
+        return [np.zeros(len(one.detected.score), dtype=bool) for one in results]
+    return [apart(one.detected, ground) & (one.detected.score >= RECOMMENDED_SCORE) for one in results]
+
+
+def _save_table(
+    path: Path, results: Sequence[FrameResult], beside: Sequence[Boolean], geometry: SceneGeometry | None
+) -> int:
+    """Write detections with the recommended score as CSV and return their number.
 
     Latitude and longitude are columns only if the map has them.
     """
@@ -451,7 +472,7 @@ def _save_table(path: Path, results: Sequence[FrameResult], score: float, geomet
     count = 0
     for number, result in enumerate(results):
         found = result.detected
-        kept = np.flatnonzero(found.score >= score)
+        kept = np.flatnonzero(found.score >= RECOMMENDED_SCORE)
         where = None
         if georeferenced and geometry is not None and len(kept):
             where = geometry.geo_reference.geographic(found.boxes[kept, :3] + geometry.origin)
@@ -461,7 +482,10 @@ def _save_table(path: Path, results: Sequence[FrameResult], score: float, geomet
             place = [] if where is None else [f"{where[row, 1]:.7f}", f"{where[row, 0]:.7f}"]
             angle = f"{math.degrees(yaw):.1f}"
             write.writerow(
-                [number, f"{result.time:.3f}", found.category[one], f"{found.score[one]:.3f}", *sizes, angle, *place]
+                [
+                    *(number, f"{result.time:.3f}", found.category[one], f"{found.score[one]:.3f}", *sizes, angle),
+                    *("yes" if beside[number][one] else "", *place),
+                ]
             )
             count += 1
     with whole_file(path) as temporary:

@@ -8,6 +8,7 @@ from collections.abc import Callable
 
 import bpy
 import numpy as np
+from numpy.typing import NDArray
 
 from . import preferences
 from .core.arrays import Boolean, Integer
@@ -15,6 +16,7 @@ from .core.choosing.placement.deployment import Deployment
 from .core.errors import SeipError
 from .core.sensing.scans.sensor import MountedSensor
 from .core.sensing.visibility.visibility_model import VisibilityModel
+from .core.workflows.returns import SensorReturns
 from .scene import contract
 from .scene.coverage_colours import show_seen_by
 from .scene.sensors import read_sensors
@@ -24,12 +26,14 @@ from .session import FollowedSensors, SceneState, scene_of, session
 DELAY = 0.02  # seconds from a movement to the look at it: a drag reports many
 
 
-def start(scene: bpy.types.Scene, state: SceneState, visibility: VisibilityModel) -> None:
-    """Follow the sensors of a scene from now on, from what the placement's own see."""
+def start(
+    scene: bpy.types.Scene, state: SceneState, visibility: VisibilityModel, returns: SensorReturns | None
+) -> None:
+    """Follow the sensors of a scene, starting with the visibility of the placement."""
     stop()
     _, solution = state.placed()
-    known = _as_placed(solution.deployment)
-    session.following = FollowedSensors(scene.session_uid, state, visibility, known)
+    known = _as_placed(solution.deployment, returns)
+    session.following = FollowedSensors(scene.session_uid, state, visibility, returns, known)
     for event, handler in _handlers():
         getattr(bpy.app.handlers, event).append(handler)
     update()
@@ -67,11 +71,17 @@ def _update(followed: FollowedSensors, scene: bpy.types.Scene) -> None:
         del followed.sensors[label]
     for label, sensor in sensors.items():
         if label not in followed.sensors or not _same(followed.sensors[label][0], sensor):
-            followed.sensors[label] = (sensor, followed.visibility.see(sensor.model, sensor.xyz, sensor.orientation))
-    seen_by: Integer = np.sum([seen for _, seen in followed.sensors.values()], axis=0, dtype=np.int64)
+            seen = followed.visibility.see(sensor.model, sensor.xyz, sensor.orientation)
+            followed.sensors[label] = (sensor, seen, None if followed.returns is None else followed.returns.of(sensor))
+    mounted, rows, returns = zip(*followed.sensors.values(), strict=True) if followed.sensors else ((), (), ())
+    seen_by: Integer = np.sum(rows, axis=0, dtype=np.int64)
     followed.coverage = float(np.count_nonzero(seen_by)) / len(seen_by)
     followed.moved = _moved(followed, sensors)
-    show_seen_by(scene, seen_by, moved=bool(followed.moved))
+    pedestrians = None
+    if followed.returns is not None:
+        followed.summary = followed.returns.summary(mounted, returns)
+        pedestrians = followed.returns.near_targets(returns)
+    show_seen_by(scene, seen_by, pedestrians)
 
 
 def _moved(followed: FollowedSensors, sensors: dict[str, MountedSensor]) -> tuple[str, ...]:
@@ -80,10 +90,14 @@ def _moved(followed: FollowedSensors, sensors: dict[str, MountedSensor]) -> tupl
     return tuple(label for label, sensor in sensors.items() if label not in placed or not _same(sensor, placed[label]))
 
 
-def _as_placed(deployment: Deployment) -> dict[str, tuple[MountedSensor, Boolean]]:
-    """Return the visibility of sensors at candidate poses; that of the others is computed again."""
+def _as_placed(
+    deployment: Deployment, returns: SensorReturns | None
+) -> dict[str, tuple[MountedSensor, Boolean, NDArray[np.float32] | None]]:
+    """Return visibility and returns of sensors at candidate poses; those of the others are computed again."""
     seen = zip(deployment.sensors, deployment.rows, strict=True)
-    return {sensor.label: (sensor, row) for sensor, row in seen if sensor.pose is not None}
+    return {
+        one.label: (one, row, None if returns is None else returns.of(one)) for one, row in seen if one.pose is not None
+    }
 
 
 def _same(one: MountedSensor, other: MountedSensor) -> bool:

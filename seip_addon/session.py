@@ -14,11 +14,13 @@ from typing import Any
 
 import bpy
 import numpy as np
+from numpy.typing import NDArray
 
 from .background import Background
 from .core.acceptance import Acceptance
 from .core.arrays import Boolean
 from .core.choosing.placement.objective import Solution
+from .core.choosing.placement.returns_summary import ReturnsSummary
 from .core.errors import SeipError
 from .core.progress import Progress
 from .core.sensing.lidar.model import LidarModel
@@ -31,6 +33,7 @@ from .core.sensing.traffic.source import TrafficFiles
 from .core.sensing.traffic.trajectories import Trajectories
 from .core.sensing.visibility.visibility_model import VisibilityModel
 from .core.storage.files import check_folder
+from .core.workflows.returns import SensorReturns
 from .core.workflows.site_places import SitePlaces
 from .core.workflows.survey import Layout, Survey
 from .core.workflows.survey_settings import SurveySettings
@@ -170,10 +173,14 @@ class FollowedSensors:
         The scene's session number.
     visibility : VisibilityModel
         Visibility of the site.
-    sensors : dict of str to (MountedSensor, (t,) bool)
-        Where each was when it was looked from last, and what it saw.
+    returns : SensorReturns or None
+        Returns from road users, for a placement that was chosen for them.
+    sensors : dict of str to (MountedSensor, (t,) bool, (m,) float32 or None)
+        Last pose of each sensor, the targets seen, and the returns from road users.
     coverage : float
         Share of the targets that some sensor sees.
+    summary : ReturnsSummary or None
+        Returns of all sensors together.
     moved : tuple of str
         Labels of those that are not where the placement put them.
     problem : str
@@ -183,8 +190,10 @@ class FollowedSensors:
     scene: int
     state: SceneState
     visibility: VisibilityModel
-    sensors: dict[str, tuple[MountedSensor, Boolean]] = field(default_factory=dict)
+    returns: SensorReturns | None
+    sensors: dict[str, tuple[MountedSensor, Boolean, NDArray[np.float32] | None]] = field(default_factory=dict)
     coverage: float = 0.0
+    summary: ReturnsSummary | None = None
     moved: tuple[str, ...] = ()
     problem: str = ""
 

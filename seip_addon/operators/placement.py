@@ -51,7 +51,7 @@ class _Placing(LongWork[SceneState]):
 
 
 class SEIP_OT_solve_placement(ForReadyScene, _Placing, bpy.types.Operator):
-    """Choose the sensors that cover most, or the cheapest that cover enough, and put them into the scene"""
+    """Choose the best sensors for the number, budget or coverage, and place them in the scene"""
 
     bl_idname = "seip.solve_placement"
     bl_label = "Place Sensors"
@@ -148,7 +148,7 @@ class SEIP_OT_choose_number(bpy.types.Operator):
 
 
 class SEIP_OT_add_rule(bpy.types.Operator):
-    """Demand, or forbid, a sensor at the position of the selected pole or sensor, or at the one that is named"""
+    """Require or forbid a sensor at the position of the selected pole or sensor, or at the named one"""
 
     bl_idname = "seip.add_rule"
     bl_label = "Add Rule"
@@ -156,7 +156,7 @@ class SEIP_OT_add_rule(bpy.types.Operator):
 
     rule: bpy.props.EnumProperty(
         name="Rule",
-        description="What must be at the position",
+        description="Requirement at the position",
         items=(("MANDATORY", "Sensor", "There must be a sensor"), ("FORBIDDEN", "No sensor", "There must be none")),
     )
 
@@ -176,7 +176,7 @@ class SEIP_OT_add_rule(bpy.types.Operator):
 
 
 class SEIP_OT_remove_rule(bpy.types.Operator):
-    """Take a rule off the list"""
+    """Remove the rule from the list"""
 
     bl_idname = "seip.remove_rule"
     bl_label = "Remove Rule"

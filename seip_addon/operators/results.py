@@ -19,7 +19,7 @@ from .. import live_coverage, preferences, scene_status, scene_survey
 from ..core.choosing.placement.objective import Objective
 from ..core.errors import SeipError
 from ..core.output.report.write import write_report
-from ..core.output.results.answer import change_text
+from ..core.output.results.answer import answer, change_text
 from ..core.output.results.comparison import compare, packed_counts, unpacked_counts
 from ..core.output.results.file_names import REPORT_FILES
 from ..core.output.results.placement_file import load_placement, parsed_record
@@ -31,6 +31,7 @@ from ..core.sensing.visibility.visibility_model import VisibilityModel, visibili
 from ..core.storage.files import check_folder, digest
 from ..core.workflows.moved_sensors import evaluate_moved_sensors
 from ..core.workflows.records import record_of
+from ..core.workflows.returns import SensorReturns
 from ..core.workflows.survey import Survey
 from ..scene.blend_file import save_blend
 from ..scene.coverage_colours import recolour, show_seen_by
@@ -50,6 +51,9 @@ PLAN, REPORT = "plan.png", REPORT_FILES[0]
 _RECORD = "placement.json"
 EYE_DISTANCE = 10.0
 """Metres from a sensor's eye to the point that the view turns about."""
+
+
+_Following = tuple[SceneState, VisibilityModel, SensorReturns | None]  # what following sensors needs
 
 
 class ForPlacement(ForReadyScene):
@@ -85,7 +89,7 @@ def no_folder(scene: bpy.types.Scene) -> str:
 
 
 class SEIP_OT_look_from_sensor(ForPlacement, bpy.types.Operator):
-    """Set the view to the eye of the sensor that is active in the list, towards the road"""
+    """Look from the sensor that is active in the list towards the road"""
 
     bl_idname = "seip.look_from_sensor"
     bl_label = "View from Sensor"
@@ -125,7 +129,7 @@ class SEIP_OT_keep_placement(ForPlacement, bpy.types.Operator):
     bl_label = "Keep Placement"
     bl_options = {"REGISTER", "UNDO"}
 
-    name: bpy.props.StringProperty(name="Name", description="Under which it is kept; empty for a number")
+    name: bpy.props.StringProperty(name="Name", description="Name of the kept placement; numbered if empty")
 
     @classmethod
     def why_not(cls, context: bpy.types.Context) -> str:
@@ -155,7 +159,7 @@ def _free_name(taken: set[str]) -> str:
 
 
 class SEIP_OT_drop_placement(bpy.types.Operator):
-    """Forget the kept placement that is active in the list"""
+    """Remove the kept placement that is active in the list"""
 
     bl_idname = "seip.drop_placement"
     bl_label = "Remove Kept Placement"
@@ -176,7 +180,7 @@ class SEIP_OT_drop_placement(bpy.types.Operator):
 
 
 class SEIP_OT_show_comparison(ForPlacement, bpy.types.Operator):
-    """Colour the road by which of the two placements see it: both, only the kept, only the present or neither"""
+    """Colour the road by the placements that see it: both, only the kept one, only the present one or neither"""
 
     bl_idname = "seip.show_comparison"
     bl_label = "Show Difference"
@@ -207,8 +211,8 @@ class SEIP_OT_show_comparison(ForPlacement, bpy.types.Operator):
         self.report({"INFO"}, f"{kept.name} and the present placement: {shares} of the road")
 
 
-class SEIP_OT_follow_sensors(ForPlacement, LongWork[tuple[SceneState, VisibilityModel]], bpy.types.Operator):
-    """Show the coverage change while sensors are moved or turned by hand; press again to end it"""
+class SEIP_OT_follow_sensors(ForPlacement, LongWork[_Following], bpy.types.Operator):
+    """Toggle live coverage while sensors are moved or turned by hand"""
 
     bl_idname = "seip.follow_sensors"
     bl_label = "Follow Moved Sensors"
@@ -225,28 +229,29 @@ class SEIP_OT_follow_sensors(ForPlacement, LongWork[tuple[SceneState, Visibility
             return {"FINISHED"}
         return super().execute(context)
 
-    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, tuple[SceneState, VisibilityModel]]:
+    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, _Following]:
         """Return the job that restores the placement."""
         return _set_up(scene_survey.with_placement(scene))
 
-    def conclude(self, scene: bpy.types.Scene, result: tuple[SceneState, VisibilityModel]) -> None:
+    def conclude(self, scene: bpy.types.Scene, result: _Following) -> None:
         """Begin to follow."""
-        state, model = result
+        state, model, returns = result
         session.keep_state(scene, state)
-        live_coverage.start(scene, state, model)
+        live_coverage.start(scene, state, model, returns)
 
 
-def _set_up(
-    finding: Generator[Progress, None, SceneState],
-) -> Generator[Progress, None, tuple[SceneState, VisibilityModel]]:
+def _set_up(finding: Generator[Progress, None, SceneState]) -> Generator[Progress, None, _Following]:
     state = yield from finding
     settings = state.layout.settings
     yield Progress(0, 0, "getting ready to cast")
-    return state, visibility_model(state.layout.site, settings.visibility, settings.engine)
+    visibility = visibility_model(state.layout.site, settings.visibility, settings.engine)
+    _, solution = state.placed()
+    of_returns = solution.deployment.returns is not None
+    return state, visibility, SensorReturns(state.layout, solution.objective) if of_returns else None
 
 
 class SEIP_OT_evaluate_sensors(ForPlacement, LongWork[SceneState], bpy.types.Operator):
-    """Evaluate the sensors where they are now, moved, deleted and added by hand, and make them the placement"""
+    """Evaluate the sensors of the scene at their present poses, and make them the placement"""
 
     bl_idname = "seip.evaluate_sensors"
     bl_label = "Evaluate Moved Sensors"
@@ -267,8 +272,9 @@ class SEIP_OT_evaluate_sensors(ForPlacement, LongWork[SceneState], bpy.types.Ope
         live_coverage.stop()
         take_over(scene, survey.site, solution.deployment, labelled_sensors(scene, hidden=True))
         provenance = Provenance(datetime.now(UTC), result.durations, versions(blender=bpy.app.version_string))
-        keep_result(scene, result, record_of(survey, solution, provenance))
-        self.report({"INFO"}, f"coverage {solution.deployment.coverage:.2%} at the sensors' present poses")
+        record = record_of(survey, solution, provenance)
+        keep_result(scene, result, record)
+        self.report({"INFO"}, answer(record)[0])
 
 
 def _evaluated(
@@ -320,7 +326,7 @@ def _checked_folder(scene: bpy.types.Scene) -> Path:
 
 
 class SEIP_OT_export_result(_Writes[SceneState], bpy.types.Operator):
-    """Write tables, pictures and the scene with its sensors to the folder, in place of earlier ones"""
+    """Write tables, pictures and the scene with its sensors to the folder, replacing earlier ones"""
 
     bl_idname = "seip.export_result"
     bl_label = "Export"
@@ -365,7 +371,7 @@ def _exported(folder: Path, scene: bpy.types.Scene) -> Generator[Progress, None,
 
 
 class SEIP_OT_write_report(_Writes[tuple[SceneState, tuple[Path, ...]]], bpy.types.Operator):
-    """Write a report on the placement into the folder, a page of HTML and a PDF, and export the placement if it is not there yet"""  # noqa: E501  # a tooltip is one line
+    """Write a report on the placement to the folder, as HTML and PDF; export the placement first if needed"""
 
     bl_idname = "seip.write_report"
     bl_label = "Write Report"

@@ -34,7 +34,7 @@ class SEIP_OT_list_sensor_types(bpy.types.Operator):
 
 
 class SEIP_OT_drop_sensor_type(bpy.types.Operator):
-    """Choose this sensor no longer"""
+    """Remove this sensor from the choice"""
 
     bl_idname = "seip.drop_sensor_type"
     bl_label = "Remove Sensor"
@@ -111,12 +111,12 @@ class SEIP_OT_add_catalogue(_EditsCatalogues, bpy.types.Operator):
 
 
 class SEIP_OT_remove_catalogue(_EditsCatalogues, bpy.types.Operator):
-    """Forget a catalogue of your own; the file stays"""
+    """Remove a catalogue of your own from the list; the file stays"""
 
     bl_idname = "seip.remove_catalogue"
     bl_label = "Remove Catalogue"
 
-    index: bpy.props.IntProperty(name="Number", description="Of the catalogue, from 0", min=0)
+    index: bpy.props.IntProperty(name="Number", description="Index of the catalogue, from 0", min=0)
 
     def execute(self, _context: bpy.types.Context) -> Outcome:
         """Forget it."""
@@ -128,7 +128,7 @@ class SEIP_OT_remove_catalogue(_EditsCatalogues, bpy.types.Operator):
 
 
 class SEIP_OT_empty_cache(Conditional, bpy.types.Operator):
-    """Delete all visibility that was kept: it is computed again where it is needed"""
+    """Delete all stored visibility grids; they are computed again when needed"""
 
     bl_idname = "seip.empty_cache"
     bl_label = "Empty Cache"
@@ -177,7 +177,7 @@ class SEIP_MT_survey_presets(bpy.types.Menu):
 
 
 class SEIP_OT_add_survey_preset(AddPresetBase, bpy.types.Operator):
-    """Keep types, heights and all other settings of the survey under a name, or remove the preset that is shown"""
+    """Save types, heights and all other survey settings under a name, or remove the preset shown"""
 
     bl_idname = "seip.add_survey_preset"
     bl_label = "Add Survey Preset"

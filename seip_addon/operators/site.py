@@ -288,7 +288,7 @@ class _RoleOperator(Conditional):
 
     bl_options = {"REGISTER", "UNDO"}
 
-    role: bpy.props.EnumProperty(name="Role", description="What the objects mean to the placement", items=ROLE_ITEMS)
+    role: bpy.props.EnumProperty(name="Role", description="Role of the objects in the placement", items=ROLE_ITEMS)
 
     @classmethod
     def why_not(cls, context: bpy.types.Context) -> str:
@@ -343,12 +343,12 @@ class SEIP_OT_add_area(_WritesScene, bpy.types.Operator):
 
     role: bpy.props.EnumProperty(
         name="Role",
-        description="What the area means to the placement",
+        description="Role of the area in the placement",
         items=AREA_ITEMS,
     )
     place: bpy.props.EnumProperty(
         name="Place",
-        description="Where the area is laid",
+        description="Position of the area",
         items=(
             ("VIEW", "View", "In the middle of the view, as large as most of it, at the height of the 3D cursor"),
             ("CURSOR", "3D Cursor", "At the 3D cursor"),
@@ -356,11 +356,22 @@ class SEIP_OT_add_area(_WritesScene, bpy.types.Operator):
         default="CURSOR",
     )
     size: bpy.props.FloatVectorProperty(
-        name="Size", description="Along x and y", size=2, unit="LENGTH", default=(40.0, 40.0), min=0.1, soft_max=500.0
+        name="Size",
+        description="Lengths along x and y",
+        size=2,
+        unit="LENGTH",
+        default=(40.0, 40.0),
+        min=0.1,
+        soft_max=500.0,
     )
-    turn: bpy.props.FloatProperty(name="Rotation", description="Counter-clockwise", subtype="ANGLE")
+    turn: bpy.props.FloatProperty(name="Rotation", description="Angle, counter-clockwise", subtype="ANGLE")
     corners: bpy.props.IntProperty(
-        name="Corners", description="Four make a rectangle, more an ellipse", default=4, min=3, soft_max=32, max=360
+        name="Corners",
+        description="Four for a rectangle, more for an ellipse",
+        default=4,
+        min=3,
+        soft_max=32,
+        max=360,
     )
 
     @classmethod
@@ -388,7 +399,7 @@ class SEIP_OT_add_area(_WritesScene, bpy.types.Operator):
 
 
 class SEIP_OT_check_site(LongWork[SiteCheck], bpy.types.Operator):
-    """Count what the scene holds by role, and list what stops a placement or harms its answer"""
+    """Count the objects by role, and list problems that prevent a placement or make it wrong"""
 
     bl_idname = "seip.check_site"
     bl_label = "Check Site"
@@ -444,7 +455,7 @@ def in_short(problems: Iterable[SEIP_PG_problem]) -> str:
 
 
 class SEIP_OT_show_problem(bpy.types.Operator):
-    """Select the object that the problem is about, and bring it into view"""
+    """Select the object with the problem, and bring it into view"""
 
     bl_idname = "seip.show_problem"
     bl_label = "Show Object"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Generator, Sequence
 from pathlib import Path
 
@@ -14,8 +13,8 @@ from ..core.output.results.versions import versions
 from ..core.progress import Progress, finish
 from ..core.sensing.scans.run_folder import Record, Run, check_run_folder
 from ..core.sensing.scans.sensor import MountedSensor
-from ..core.sensing.traffic.source import TrafficFiles, load_traffic
-from ..core.sensing.traffic.trajectories import CATEGORIES, LoadedTraffic, Trajectories
+from ..core.sensing.traffic.source import TrafficFiles, describe_categories, load_traffic
+from ..core.sensing.traffic.trajectories import LoadedTraffic, Trajectories
 from ..core.site.scene_geometry import SceneGeometry
 from ..core.workflows.recording import RecordingSettings, make_run, record, simulation_of
 from ..properties.conversion import output_folder
@@ -55,7 +54,7 @@ class _Scanning(Conditional, LongWork[Result]):
 
 
 class SEIP_OT_load_traffic(Conditional, LongWork[LoadedTraffic], bpy.types.Operator):
-    """Read the traffic file and put its road users on the road, to press play on"""
+    """Read the traffic file and animate its road users on the road"""
 
     bl_idname = "seip.load_traffic"
     bl_label = "Load Traffic"
@@ -88,7 +87,7 @@ def show_traffic(scene: bpy.types.Scene, traffic: SceneTraffic, warnings: Sequen
 
 
 class SEIP_OT_clear_traffic(Conditional, bpy.types.Operator):
-    """Take the loaded road users out of the scene; objects of your own stay"""
+    """Remove the loaded road users from the scene; your own objects stay"""
 
     bl_idname = "seip.clear_traffic"
     bl_label = "Clear Traffic"
@@ -110,7 +109,7 @@ class SEIP_OT_clear_traffic(Conditional, bpy.types.Operator):
 
 
 class SEIP_OT_scan_frame(_Scanning[LastScan], bpy.types.Operator):
-    """Show what the placed sensors measure at the current frame of the timeline"""
+    """Show the point cloud of the placed sensors at the current frame"""
 
     bl_idname = "seip.scan_frame"
     bl_label = "Scan This Frame"
@@ -153,7 +152,7 @@ class SEIP_OT_hide_scan(bpy.types.Operator):
 
 
 class SEIP_OT_write_dataset(_Scanning[tuple[Record, tuple[str, ...]]], bpy.types.Operator):
-    """Scan frame after frame and write them, with the boxes of all road users, as datasets to train detectors on"""
+    """Scan all frames and write them with the boxes of all road users, as datasets for training detectors"""
 
     bl_idname = "seip.write_dataset"
     bl_label = "Write Dataset"
@@ -214,9 +213,7 @@ class _SceneRead:
 
 def _facts(trajectories: Trajectories) -> list[str]:
     begin, end = trajectories.span
-    counts = Counter(user.category for user in trajectories.users)
-    kinds = [f"{counts[category]} {category}" for category in CATEGORIES if counts[category]]
-    return [f"{counted(len(trajectories), 'road user')}, {begin:g} to {end:g} s", ", ".join(kinds)]
+    return [f"{counted(len(trajectories), 'road user')}, {begin:g} to {end:g} s", describe_categories(trajectories)]
 
 
 CLASSES = (

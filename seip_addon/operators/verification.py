@@ -84,7 +84,7 @@ def _folder_of(scene: bpy.types.Scene) -> Path:
 
 
 class SEIP_OT_verify(Conditional, LongWork[_Verified], bpy.types.Operator):
-    """Compare the installed sensors with the plan by a recording: their poses, what has changed, and the coverage"""
+    """Compare the installed sensors with the plan by a recording: poses, changes and coverage"""
 
     bl_idname = "seip.verify"
     bl_label = "Verify Installation"
@@ -150,7 +150,7 @@ def _verified(
 
 
 class SEIP_OT_correct_scene(Conditional, bpy.types.Operator):
-    """Add the objects that were found as boxes, remove those that are gone, and move the sensors to where they are installed"""  # noqa: E501  # a tooltip is one line
+    """Add new objects as boxes, remove those that are gone, and move the sensors to their installed poses"""
 
     bl_idname = "seip.correct_scene"
     bl_label = "Add to Scene"
@@ -176,7 +176,7 @@ class SEIP_OT_correct_scene(Conditional, bpy.types.Operator):
 
 
 class SEIP_OT_show_changes(bpy.types.Operator):
-    """Show the recording and what differs from the scene in the window in which Blender shows renderings"""
+    """Show the recording and its differences from the scene in the render window"""
 
     bl_idname = "seip.show_changes"
     bl_label = "Show Picture"

@@ -44,7 +44,7 @@ class SEIP_OT_colour_coverage(Conditional, bpy.types.Operator):
 
     aspect: bpy.props.EnumProperty(
         name="Show",
-        description="What the colours of the road mean",
+        description="Meaning of the road's colours",
         items=(
             ("returns", "Returns", "Expected returns from a pedestrian there, where sensors were placed for returns"),
             ("seen", "Seen", "Whether any sensor measures the surface of the road"),
@@ -121,7 +121,7 @@ class SEIP_OT_show_sight_lines(ForPlacement, LongWork[SceneState], bpy.types.Ope
     bl_label = "Show Sight Lines"
     bl_options = {"REGISTER"}  # nothing in the file changes
 
-    sensor: bpy.props.EnumProperty(name="Sensor", description="From which the lines start", items=_sensors)
+    sensor: bpy.props.EnumProperty(name="Sensor", description="Sensor that the lines start from", items=_sensors)
 
     def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, SceneState]:
         """Return the job that restores the placement."""
@@ -145,7 +145,7 @@ class SEIP_OT_show_sight_lines(ForPlacement, LongWork[SceneState], bpy.types.Ope
 
 
 class SEIP_OT_hide_sight_lines(bpy.types.Operator):
-    """Draw no sight lines"""
+    """Hide the sight lines"""
 
     bl_idname = "seip.hide_sight_lines"
     bl_label = "Hide Sight Lines"

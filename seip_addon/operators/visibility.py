@@ -14,7 +14,7 @@ from .base import ForReadyScene, LongWork
 
 
 class SEIP_OT_compute_visibility(ForReadyScene, LongWork[SceneState], bpy.types.Operator):
-    """Find out which candidate pose sees which target on the road"""
+    """Compute which targets on the road are visible from each candidate pose"""
 
     bl_idname = "seip.compute_visibility"
     bl_label = "Compute Visibility"
@@ -33,7 +33,7 @@ class SEIP_OT_compute_visibility(ForReadyScene, LongWork[SceneState], bpy.types.
 
 
 class SEIP_OT_compare_scene(ForReadyScene, LongWork[SceneState], bpy.types.Operator):
-    """Find out whether the placement is of the scene as it is now"""
+    """Check whether the placement still matches the scene"""
 
     bl_idname = "seip.compare_scene"
     bl_label = "Compare with Scene"

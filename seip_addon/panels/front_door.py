@@ -31,7 +31,7 @@ DIALOG_WIDTH = 420
 
 
 class SEIP_OT_choose_place(bpy.types.Operator):
-    """Choose the junction that the site is about, and how much of its streets"""
+    """Choose the junction of the site, and the length of its streets"""
 
     bl_idname = "seip.choose_place"
     bl_label = "Import Site"

@@ -31,12 +31,12 @@ class SEIP_AP_preferences(bpy.types.AddonPreferences):
     cache: bpy.props.StringProperty(
         name="Cache",
         subtype="DIR_PATH",
-        description="Where visibility is kept from run to run; empty for the extension's own folder",
+        description="Folder for stored visibility grids; empty for the extension's own folder",
     )
     python: bpy.props.StringProperty(
         name="Python with PyTorch",
         subtype="FILE_PATH",
-        description="In which Detect runs: .venv/bin/python of a checkout of this project after `make detection`, "
+        description="Python for Detect: .venv/bin/python of a checkout of this project after `make detection`, "
         "or one of your own after `pip install '.[detection]'` there",
     )
     sumo: bpy.props.StringProperty(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import bpy
 
+from ..core.choosing.placement.returns_summary import returns_text
 from ..core.errors import SeipError
 from ..core.output.results.comparison import BOTH, CLASS_WORDS, KEPT_ONLY, NEITHER, PRESENT_ONLY, compared_shares
 from ..core.output.results.placement_file import parsed_record
@@ -85,9 +86,21 @@ def _draw_followed(layout: bpy.types.UILayout, following: FollowedSensors) -> No
     if following.problem:
         draw_sentence(layout, following.problem, icon="ERROR", alert=True)
         return
-    layout.label(text=f"Coverage now {following.coverage:.2%}", icon="HIDE_OFF")
+    layout.label(text=_followed_text(following), icon="HIDE_OFF")
     if following.moved:
         draw_sentence(layout, f"Moved by hand: {', '.join(following.moved)}.")
+
+
+def _followed_text(following: FollowedSensors) -> str:
+    """Return the quality of the placement and of the sensors as they are now, by what the placement was chosen for."""
+    _, solution = following.state.placed()
+    placed = solution.deployment
+    if placed.returns is None or following.summary is None:
+        before, now, what = f"{placed.coverage:.1%}", f"{following.coverage:.1%}", "of the road"
+    else:
+        before, now = returns_text(placed.returns.typical), returns_text(following.summary.typical)
+        what = "returns"
+    return f"{now} {what}" if before == now else f"{before} → {now} {what}"
 
 
 def _draw_comparison(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
@@ -120,8 +133,10 @@ def _draw_table(layout: bpy.types.UILayout, kept: PlacementRecord, present: Plac
     grid = layout.grid_flow(row_major=True, columns=3, even_columns=True, align=True)
     for text in ("", "Kept", "Present"):
         grid.label(text=text)
+    returns = ("Returns", _returns(kept), _returns(present))
     for name, one, other in (
-        ("Coverage", _share(kept.coverage.whole), _share(present.coverage.whole)),
+        *([returns] if kept.returns or present.returns else []),
+        ("Road Seen", _share(kept.coverage.whole), _share(present.coverage.whole)),
         ("Central", _share(kept.coverage.central), _share(present.coverage.central)),
         ("Price", kept.price_text, present.price_text),
         ("Sensors", str(len(kept.sensors)), str(len(present.sensors))),
@@ -138,6 +153,10 @@ def _draw_shares(layout: bpy.types.UILayout, shares: tuple[float, ...]) -> None:
         row = column.split(factor=0.75)
         row.label(text=f"  {CLASS_WORDS[number].capitalize()}")
         row.label(text=f"{shares[number]:.2%}")
+
+
+def _returns(record: PlacementRecord) -> str:
+    return "–" if record.returns is None else returns_text(record.returns.typical)
 
 
 def _share(value: float | None) -> str:

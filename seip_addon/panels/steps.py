@@ -13,8 +13,7 @@ class SEIP_PT_steps(Sidebar, bpy.types.Panel):
     """Panel: the three steps to a placement, each with its status, and what follows; the current step is open."""
 
     bl_idname = "SEIP_PT_steps"
-    bl_label = "SEIP"
-    bl_options = {"HIDE_HEADER"}
+    bl_label = "Sensor Placement"
 
     def draw(self, context: bpy.types.Context) -> None:
         """Draw the sections."""

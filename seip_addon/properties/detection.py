@@ -24,13 +24,13 @@ class SEIP_PG_detection(bpy.types.PropertyGroup):
     )
     folder: StringProperty(
         name="Folder",
-        description="Where figures, charts and detections are written; // is the folder of the .blend",
+        description="Folder for figures, charts and detections; // is the folder of the .blend",
         subtype="DIR_PATH",
         default="//seip-detection/",
         options={"OUTPUT_PATH", "PATH_SUPPORTS_BLEND_RELATIVE"},
     )
-    record: StringProperty(name="Record", description="The figures as detection.json holds them")
-    sensors: StringProperty(name="Sensors", description="Digest of the sensors that the figures are of")
+    record: StringProperty(name="Record", description="Figures as in detection.json")
+    sensors: StringProperty(name="Sensors", description="Digest of the sensors of the figures")
 
 
 CLASSES = (SEIP_PG_detection,)

@@ -19,7 +19,7 @@ class SEIP_PG_position_rule(bpy.types.PropertyGroup):
 
     rule: EnumProperty(
         name="Rule",
-        description="What must be at this position",
+        description="Requirement at this position",
         items=(("MANDATORY", "Sensor", "There must be a sensor"), ("FORBIDDEN", "No sensor", "There must be none")),
     )
 
@@ -29,7 +29,7 @@ class SEIP_PG_goal(bpy.types.PropertyGroup):
 
     limit: EnumProperty(
         name="Goal",
-        description="What limits the placement",
+        description="Limit of the placement",
         items=(
             ("COUNT", "Number", "The most coverage for a number of sensors"),
             ("BUDGET", "Budget", "The most coverage for a sum of money"),
@@ -50,7 +50,7 @@ class SEIP_PG_goal(bpy.types.PropertyGroup):
     )
     weighting: EnumProperty(
         name="Weights",
-        description="How targets in weighted regions count",
+        description="Weighting of targets in weighted regions",
         items=(
             ("NONE", "Uniform", "Every target counts the same"),
             ("SCENE", "Weights of Regions", "Each region's own weight counts"),
@@ -58,7 +58,7 @@ class SEIP_PG_goal(bpy.types.PropertyGroup):
         ),
     )
     central_weight: FloatProperty(
-        name="Weight", description="Of targets in weighted regions, where others have 1", default=2.0, min=0.001
+        name="Weight", description="Weight of targets in weighted regions; others have 1", default=2.0, min=0.001
     )
     min_distance: of_setting(Objective, "min_distance", "Min. Distance")
     criterion: of_setting(
@@ -73,7 +73,7 @@ class SEIP_PG_goal(bpy.types.PropertyGroup):
     )
     scenarios: EnumProperty(
         name="Scenarios",
-        description="What the placement is optimised over",
+        description="Conditions that the placement is optimised for",
         items=(
             ("nominal", "Nominal", "Poses as planned on the empty road"),
             ("pose-errors", "Pose Errors", "Random errors of the sensors' poses"),

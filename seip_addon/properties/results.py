@@ -15,15 +15,15 @@ class SEIP_PG_chosen(bpy.types.PropertyGroup):
 class SEIP_PG_placement(bpy.types.PropertyGroup):
     """A placement: enough to find all about it again from the scene and the visibility kept in the cache."""
 
-    record: StringProperty(name="Record", description="The placement as placement.json holds it")
-    targets: StringProperty(name="Targets", description="Digest of the targets that it was made on")
-    seen: StringProperty(name="Seen", description="By how many sensors each target is seen, packed")
+    record: StringProperty(name="Record", description="Placement as in placement.json")
+    targets: StringProperty(name="Targets", description="Digest of the placement's targets")
+    seen: StringProperty(name="Seen", description="Number of sensors that see each target, packed")
 
 
 class SEIP_PG_result(SEIP_PG_placement):
     """The placement that stands in the scene, and what is looked at of it."""
 
-    change: StringProperty(name="Change", description="Whether it is better or worse than the placement before it")
+    change: StringProperty(name="Change", description="Difference from the placement before")
     sensors: CollectionProperty(type=SEIP_PG_chosen)
     active_sensor: IntProperty(
         name="Sensor",
@@ -32,7 +32,7 @@ class SEIP_PG_result(SEIP_PG_placement):
     )
     folder: StringProperty(
         name="Folder",
-        description="Where the result is written; // is the folder of the .blend",
+        description="Folder for the result; // is the folder of the .blend",
         subtype="DIR_PATH",
         default="//seip-result/",
         options={"OUTPUT_PATH", "PATH_SUPPORTS_BLEND_RELATIVE"},

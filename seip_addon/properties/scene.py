@@ -28,7 +28,7 @@ class SEIP_PG_scene(bpy.types.PropertyGroup):
     goal: PointerProperty(type=SEIP_PG_goal)
     result: PointerProperty(type=SEIP_PG_result)
     kept: CollectionProperty(type=SEIP_PG_placement)
-    active_kept: IntProperty(name="Kept Placement", description="The one that the present placement is compared with")
+    active_kept: IntProperty(name="Kept Placement", description="Placement to compare the present one with")
     view: PointerProperty(type=SEIP_PG_view)
     traffic: PointerProperty(type=SEIP_PG_traffic)
     simulation: PointerProperty(type=SEIP_PG_simulation)

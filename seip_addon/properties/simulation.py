@@ -46,13 +46,13 @@ class SEIP_PG_simulation(bpy.types.PropertyGroup):
     )
     folder: StringProperty(
         name="Folder",
-        description="Where the runs are written; // is the folder of the .blend. It is a folder for them alone",
+        description="Folder for the runs only; // is the folder of the .blend",
         subtype="DIR_PATH",
         default="//seip-traffic/",
         options={"OUTPUT_PATH", "PATH_SUPPORTS_BLEND_RELATIVE"},
     )
-    facts: StringProperty(name="Simulated", description="What was simulated last")
-    made_with: StringProperty(name="Made With", description="The settings of what was simulated last")
+    facts: StringProperty(name="Simulated", description="Summary of the last simulation")
+    made_with: StringProperty(name="Made With", description="Settings of the last simulation")
 
     def street_map(self) -> Path | bpy.types.Text | None:
         """Return the map that traffic is simulated on: a file, which may not exist, a text, or None."""

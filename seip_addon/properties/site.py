@@ -32,20 +32,20 @@ _CODE = {"min": 0, "max": 999_999}
 class SEIP_PG_junction(bpy.types.PropertyGroup):
     """A junction of the chosen file; its name is what the list shows."""
 
-    id: StringProperty(name="Id", description="Of the junction as in the map, or its latitude and longitude")
+    id: StringProperty(name="Id", description="Junction id in the map, or latitude and longitude")
 
 
 class SEIP_PG_count(bpy.types.PropertyGroup):
     """Something that the check counted; its name is what."""
 
-    value: StringProperty(name="Count", description="How much there is")
+    value: StringProperty(name="Count", description="Count")
 
 
 class SEIP_PG_problem(bpy.types.PropertyGroup):
     """Something that the check found; its name is the object to look at, or empty."""
 
-    is_error: BoolProperty(name="Error", description="Whether a survey cannot go on")
-    text: StringProperty(name="Problem", description="What is wrong, and the cure")
+    is_error: BoolProperty(name="Error", description="Whether the problem prevents a survey")
+    text: StringProperty(name="Problem", description="Problem and its cure")
 
 
 ROLE_ITEMS = tuple((role.name, role.value.capitalize(), f"{roles.WORDS[role].capitalize()}") for role in roles.ROLES)
@@ -68,7 +68,7 @@ class SEIP_PG_site(bpy.types.PropertyGroup):
     junctions: CollectionProperty(type=SEIP_PG_junction)
     junction: StringProperty(
         name="Junction",
-        description="In the middle of the site, by the streets that meet there: type to search. Empty for the middle "
+        description="Junction in the middle of the site, by its streets: type to search. Empty for the middle "
         "of the map, or the description's own place",
     )
     position: StringProperty(
@@ -78,7 +78,7 @@ class SEIP_PG_site(bpy.types.PropertyGroup):
     )
     region_shape: EnumProperty(
         name="Region",
-        description="Which part of the road about the junction is to be seen",
+        description="Part of the road around the junction to cover",
         items=(
             ("APPROACHES", "Approaches", "The junction, and the streets that lead to it up to a distance along them"),
             ("CIRCLE", "Circle", "All road within a circle about the middle of the junction"),
@@ -86,7 +86,7 @@ class SEIP_PG_site(bpy.types.PropertyGroup):
     )
     radius: FloatProperty(
         name="Radius",
-        description="Of the region of interest; or how far it follows the approaches of the junction",
+        description="Radius of the region of interest, or its length along the approaches of the junction",
         unit="LENGTH",
         default=DEFAULT_RADIUS,
         min=1.0,
@@ -96,8 +96,8 @@ class SEIP_PG_site(bpy.types.PropertyGroup):
     osm: of_setting(SiteRequest, "osm", "Surroundings", **_FILE)
     terrain: of_setting(TerrainRequest, "path", "Terrain", **_FILE)
     terrain_epsg: of_setting(TerrainRequest, "epsg", "EPSG", default=0, **_CODE)
-    role: EnumProperty(name="Role", description="What objects mean to the placement", items=ROLE_ITEMS)
-    checked: BoolProperty(name="Checked", description="Whether the check has looked at this scene")
+    role: EnumProperty(name="Role", description="Role of objects in the placement", items=ROLE_ITEMS)
+    checked: BoolProperty(name="Checked", description="Whether the scene was checked")
     counts: CollectionProperty(type=SEIP_PG_count)
     problems: CollectionProperty(type=SEIP_PG_problem)
 

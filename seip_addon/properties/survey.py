@@ -30,7 +30,7 @@ class SEIP_PG_sensor_type(bpy.types.PropertyGroup):
 
 
 class SEIP_PG_survey(bpy.types.PropertyGroup):
-    """How the site is laid out and when a target counts as seen."""
+    """Layout of the site and the visibility of its targets."""
 
     types: CollectionProperty(type=SEIP_PG_sensor_type)
     about: StringProperty(name="Sensor", description="Catalogue key of the sensor whose figures and beams are shown")
@@ -41,7 +41,7 @@ class SEIP_PG_survey(bpy.types.PropertyGroup):
     )
     preview_height: FloatProperty(
         name="Height",
-        description="Of the previewed sensor above the 3D cursor",
+        description="Height of the previewed sensor above the 3D cursor",
         unit="LENGTH",
         default=5.4,
         min=0.1,
@@ -63,7 +63,7 @@ class SEIP_PG_survey(bpy.types.PropertyGroup):
     grid: of_setting(SurveySettings, "grid_spacing", "Target Spacing", min=0.05, soft_max=10.0, step=10)
     delta: of_setting(VisibilitySettings, "delta", "Seen Within δ", min=0.01, soft_max=5.0, step=10)
     rain: of_setting(Weather, "rain", "Rain (mm/h)", max=500.0, soft_max=50.0)
-    fog: BoolProperty(name="Fog", description="Look through fog or snow")
+    fog: BoolProperty(name="Fog", description="Reduced visibility in fog or snow")
     visibility: of_setting(Weather, "visibility", "Visibility", default=200.0, soft_max=2000.0)
     wet_road: of_setting(Weather, "wet_road", "Wet Road")
     spacing: of_setting(CandidateSettings, "spacing", "Spacing", soft_max=50.0, step=50)
@@ -86,7 +86,7 @@ class SEIP_PG_survey(bpy.types.PropertyGroup):
     )
     solver: EnumProperty(
         name="Solver",
-        description="What solves the integer program",
+        description="MILP solver",
         items=(
             ("auto", "Automatic", "HiGHS where it is installed, else CBC"),
             ("highs", "HiGHS", "Comes with the extension"),

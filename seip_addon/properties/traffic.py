@@ -33,23 +33,23 @@ class SEIP_PG_traffic(bpy.types.PropertyGroup):
     )
     routes: StringProperty(
         name="Routes",
-        description="SUMO's file with the vehicle types, which knows their sizes",
+        description="SUMO file with the vehicle types and their sizes",
         subtype="FILE_PATH",
         options={"PATH_SUPPORTS_BLEND_RELATIVE"},
     )
     net: StringProperty(
         name="Network",
-        description="SUMO's .net.xml, which knows the offset from the map",
+        description="SUMO network (.net.xml) with the offset from the map",
         subtype="FILE_PATH",
         options={"PATH_SUPPORTS_BLEND_RELATIVE"},
     )
-    loaded: StringProperty(name="Loaded", description="What was found in the file, one fact a line")
+    loaded: StringProperty(name="Loaded", description="Content of the file, one fact a line")
     seed: of_setting(ScanSettings, "seed", "Seed")
     noise: BoolProperty(
-        name="Noise", description="Ranges are noisy and returns get lost, as in the sensors' data sheets", default=True
+        name="Noise", description="Noisy ranges and lost returns, as in the sensors' data sheets", default=True
     )
     rolling_shutter: of_setting(ScanSettings, "rolling_shutter", "Rolling Shutter")
-    whole: BoolProperty(name="Whole Run", description="From its first moment to its last", default=True)
+    whole: BoolProperty(name="Whole Run", description="Scan the whole run", default=True)
     start: FloatProperty(
         name="Start",
         description="Time of the first frame, in seconds",
@@ -59,7 +59,7 @@ class SEIP_PG_traffic(bpy.types.PropertyGroup):
     )
     duration: FloatProperty(
         name="Duration",
-        description="To the last frame, in seconds",
+        description="Time from the first to the last frame, in seconds",
         subtype="TIME_ABSOLUTE",
         unit="TIME_ABSOLUTE",
         default=10.0,
@@ -67,7 +67,7 @@ class SEIP_PG_traffic(bpy.types.PropertyGroup):
     )
     rate: FloatProperty(
         name="Rate (Hz)",
-        description="Frames a second; at 0 as often as the slowest sensor turns",
+        description="Frames per second; 0 for the rotation rate of the slowest sensor",
         default=0.0,
         min=0.0,
         soft_max=20.0,
@@ -75,7 +75,7 @@ class SEIP_PG_traffic(bpy.types.PropertyGroup):
     )
     folder: StringProperty(
         name="Folder",
-        description="Of the run: its frames and its datasets; a run that was stopped goes on there",
+        description="Output folder for frames and datasets; an interrupted run resumes there",
         subtype="DIR_PATH",
         default="//scans",
         options={"OUTPUT_PATH", "PATH_SUPPORTS_BLEND_RELATIVE"},
@@ -89,7 +89,7 @@ class SEIP_PG_traffic(bpy.types.PropertyGroup):
     )
     split: EnumProperty(
         name="Split",
-        description="Of the dataset that the run belongs to, whole",
+        description="Split of the dataset for the whole run",
         items=tuple((split, split.capitalize(), f"The run belongs to the split {split!r}") for split in SPLITS),
     )
 

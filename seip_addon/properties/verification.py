@@ -17,7 +17,7 @@ class SEIP_PG_verification(bpy.types.PropertyGroup):
         options={"PATH_SUPPORTS_BLEND_RELATIVE"},
     )
     found: StringProperty(
-        name="Found", description="What the last verification found, a sentence on each line", options={"HIDDEN"}
+        name="Found", description="Results of the last verification, one sentence a line", options={"HIDDEN"}
     )
 
 

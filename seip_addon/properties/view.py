@@ -13,14 +13,14 @@ def _recolour(_own: object, context: bpy.types.Context) -> None:
 
 
 class SEIP_PG_view(bpy.types.PropertyGroup):
-    """How what was found is shown."""
+    """Display settings of the results."""
 
     legend: BoolProperty(
-        name="Legend", description="Show what the colours of the coverage mean, and the sensors' labels", default=True
+        name="Legend", description="Show the legend of the coverage colours, and the sensors' labels", default=True
     )
     cloud_colour: EnumProperty(
         name="Point Colours",
-        description="What the colours of the point cloud mean",
+        description="Meaning of the point cloud's colours",
         items=(
             ("sensor", "Sensor", "Which sensor measured the point"),
             ("intensity", "Intensity", "How strong the return is"),

@@ -93,6 +93,7 @@ def _describe(scene: bpy.types.Scene, model: SiteModel, map_name: str) -> None:
     scene[contract.HEADER_OFFSET] = model.header_offset.tolist()
     scene[contract.PLACES] = places_text(model.places)
     scene[contract.ATTRIBUTION] = "\n".join(model.attribution)
+    scene[contract.ASSUMPTIONS] = "\n".join(model.notes)
     scene.unit_settings.system = "METRIC"
     scene.unit_settings.scale_length = 1.0
 

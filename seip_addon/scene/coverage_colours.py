@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
-from ..core.arrays import Integer
+from ..core.arrays import Float, Integer
 from ..core.errors import SeipError
 from ..core.output.pictures.coverage_colours import Aspect, Colouring, as_placed, colouring
 from .write import ASPECT, RETURNS, SEEN_BY, TARGET_WEIGHT, aspects_of, coverage_of, paint
@@ -30,15 +30,15 @@ def recolour(scene: bpy.types.Scene, colours: Colouring) -> None:
     paint(obj, colours)
 
 
-def show_seen_by(scene: bpy.types.Scene, seen_by: Integer, *, moved: bool = False) -> None:
+def show_seen_by(scene: bpy.types.Scene, seen_by: Integer, returns: Float | None = None) -> None:
     """Show how many sensors see each target, under the aspect that is shown.
 
     Parameters
     ----------
     seen_by : (t,) int64
         How many sensors see each target, in the order of those that the coverage was written for.
-    moved : bool
-        Whether sensors are not where they were placed: the returns of the placement are not theirs.
+    returns : (t,) float64, optional
+        Expected returns from a pedestrian near each target, if they have changed.
 
     Raises
     ------
@@ -47,9 +47,10 @@ def show_seen_by(scene: bpy.types.Scene, seen_by: Integer, *, moved: bool = Fals
     """
     obj = _shown_coverage(scene)
     aspect = obj.get(ASPECT) or aspects_of(obj)[0]  # nothing is compared any longer
-    aspect = "times" if moved and aspect == "returns" else aspect
     recolour(scene, as_placed(seen_by))
     obj.data.attributes[SEEN_BY].data.foreach_set("value", seen_by.astype(np.int32))
+    if returns is not None and RETURNS in obj.data.attributes:
+        obj.data.attributes[RETURNS].data.foreach_set("value", returns.astype(np.float32))
     colour_coverage(scene, aspect)
 
 

@@ -146,6 +146,7 @@ def geometry_of(scene: bpy.types.Scene, parts: list[Shown], hidden: dict[str, li
         geo_reference=geo_reference_of(scene),
         places=places_of(scene),
         attribution=attribution_of(scene),
+        assumptions=_lines(scene, contract.ASSUMPTIONS, "assumption"),
         keep_off_areas=_keep_off_areas(parts),
     )
     hidden_sentences = (hidden_sentence(name, objects) for name, objects in hidden.items())
@@ -461,9 +462,14 @@ def geo_reference_of(scene: bpy.types.Scene) -> GeoReference:
 
 def attribution_of(scene: bpy.types.Scene) -> tuple[str, ...]:
     """Return the credits that the sources of a scene demand, one for each line of its property."""
-    text = scene.get(contract.ATTRIBUTION, "")
+    return _lines(scene, contract.ATTRIBUTION, "credit")
+
+
+def _lines(scene: bpy.types.Scene, name: str, what: str) -> tuple[str, ...]:
+    """Return the lines of a scene's property that are not empty."""
+    text = scene.get(name, "")
     if not isinstance(text, str):
-        raise SeipError(f"scene property {contract.ATTRIBUTION} must be a text, one credit on each line, not {text!r}")
+        raise SeipError(f"scene property {name} must be a text, one {what} on each line, not {text!r}")
     return tuple(line.strip() for line in text.splitlines() if line.strip())
 
 

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from seip_addon import live_coverage
+from seip_addon.core.choosing.placement.returns_summary import returns_text
 from seip_addon.core.output.results.comparison import unpacked_counts
 from seip_addon.core.output.results.placement_file import parsed_record
 from seip_addon.panels import results as results_panel
@@ -85,3 +86,35 @@ def test_moved_sensors_are_followed(placed):
     bpy.data.objects.remove(first)
     live_coverage.update()
     assert (shown(placed) <= 1).all()
+
+
+def test_a_placement_for_returns_is_followed_and_compared_by_returns(junction):
+    scene = junction
+    scene.seip.goal.criterion = "returns"
+    bpy.ops.seip.solve_placement()
+    before = parsed_record(scene.seip.result.record).returns.typical
+    assert bpy.ops.seip.follow_sensors() == {"FINISHED"}
+    assert session.following.summary.typical == pytest.approx(before, rel=1e-3)
+    layout = DrawnLayout()
+    results_panel.draw(layout, bpy.context)
+    assert f"{returns_text(before)} returns" in layout.text
+    bpy.ops.seip.keep_placement(name="all")
+    placed_sensors(scene)["S1"].location.z += 500.0
+    live_coverage.update()
+    now = session.following.summary.typical
+    assert now < before
+    layout = DrawnLayout()
+    results_panel.draw(layout, bpy.context)
+    assert f"{returns_text(before)} → {returns_text(now)} returns" in layout.text
+    returns = np.empty(len(bpy.data.objects["Coverage"].data.polygons), dtype=np.float32)
+    bpy.data.objects["Coverage"].data.attributes["seip_returns"].data.foreach_get("value", returns)
+    one = session.following.returns.near_targets([row for _, _, row in session.following.sensors.values()])
+    assert returns == pytest.approx(one, rel=1e-5)
+    bpy.ops.seip.evaluate_sensors()
+    record = parsed_record(scene.seip.result.record)
+    assert record.returns.typical == pytest.approx(now, rel=1e-3)
+    assert "returns instead of" in scene.seip.result.change
+    scene.seip.sections.comparison = True
+    layout = DrawnLayout()
+    results_panel.draw(layout, bpy.context)
+    assert f"Returns {returns_text(before)} {returns_text(now)}" in layout.text

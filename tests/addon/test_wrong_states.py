@@ -73,7 +73,7 @@ def test_the_panel_says_what_the_record_holds(placed, monkeypatch):
     placed.seip.sections.details = True
     placement_panel.draw(DrawnLayout(), bpy.context)
     assert notes < set(said)
-    assert "Proven: the best placement that there is among these candidates." in said
+    assert "Proven by the criterion: the best placement among these candidates." in said
     figures = placement_panel.figures(parsed_record(placed.seip.result.record))
     assert dict(figures["Seen"])["Road"] == f"{record['coverage']['whole']:.2%}"
     assert dict(figures["Price"])["Total"] == f"${record['price_usd']:,.0f}"

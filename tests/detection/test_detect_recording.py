@@ -97,6 +97,7 @@ def test_the_table_lists_each_detection_with_its_score_time_and_box(results):
         rows = list(csv.DictReader(file))
     assert list(rows[0]) == [
         *("frame", "time_s", "category", "score", "x_m", "y_m", "z_m", "length_m", "width_m", "height_m", "yaw_deg"),
+        "apart",
     ]
     expected = []
     for number in range(SWEEPS):
@@ -120,9 +121,11 @@ def test_the_table_has_geographic_coordinates_if_the_map_names_its_projection(tm
     results = [SimpleNamespace(detected=detected, time=0.5)]
     reference = GeoReference("+proj=utm +zone=33 +datum=WGS84 +units=m")
     geometry = SimpleNamespace(geo_reference=reference, origin=np.array([392_000.0, 5_820_000.0, 30.0]))
-    assert detect_recording._save_table(tmp_path / "table.csv", results, 0.5, geometry) == 1  # noqa: SLF001
+    beside = [np.array([True, False])]
+    assert detect_recording._save_table(tmp_path / "table.csv", results, beside, geometry) == 1  # noqa: SLF001
     with (tmp_path / "table.csv").open(encoding="utf-8", newline="") as file:
         (row,) = csv.DictReader(file)
+    assert row["apart"] == "yes"
     ((longitude, latitude, _),) = reference.geographic(boxes[:1, :3] + geometry.origin)
     assert (float(row["longitude"]), float(row["latitude"])) == pytest.approx((longitude, latitude), abs=1e-7)
 

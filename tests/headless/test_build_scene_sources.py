@@ -46,6 +46,7 @@ def test_ground_of_a_terrain_file_is_in_the_scene(street, tmp_path, capsys):
     road = np.concatenate([mesh.triangles.reshape(-1, 3) for mesh in found.roads]) + found.origin
     assert road[:, 2] == pytest.approx(40 + 0.04 * road[:, 0], abs=0.02)
     assert "smoothed by a Gaussian of 4 m" in capsys.readouterr().out
+    assert any("smoothed by a Gaussian of 4 m" in one for one in found.assumptions)
 
 
 @pytest.mark.parametrize(("more", "complaint"), [

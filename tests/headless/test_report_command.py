@@ -32,6 +32,7 @@ def folder(small_scene, tmp_path_factory):
     scene = bpy.context.scene
     scene[contract.GEO_REFERENCE] = "+proj=utm +zone=32 +datum=WGS84"
     scene[contract.ATTRIBUTION] = f"{CREDIT}\nSurveyors & Sons"
+    scene[contract.ASSUMPTIONS] = "one lane is assumed in each direction of Mill Lane\n<b>no</b> bridges"
     scene[contract.HEADER_OFFSET] = [-4_500_000.0, 5_300_000.0, 0.0, 0.0]
     scene[contract.PLACES] = json.dumps([["Mill Lane", "POLYGON ((-36 -7, -7 -7, -7 7, -36 7, -36 -7))"]])
     save_blend(made / "located.blend")
@@ -59,6 +60,9 @@ def test_everything_that_is_shared_names_the_sources(folder):
     assert (folder / "ATTRIBUTION.txt").read_text(encoding="utf-8") == f"{CREDIT}\nSurveyors & Sons\n"
     assert json.loads((folder / "placement.geojson").read_text(encoding="utf-8"))["attribution"][0] == CREDIT
     page = (folder / "report.html").read_text(encoding="utf-8")
+    assert "One lane is assumed in each direction of Mill Lane." in page
+    assert "&lt;b&gt;no&lt;/b&gt; bridges." in page
+    assert "may be off by several metres" in page
     assert f"Map data: {CREDIT}." in page
     assert "Map data: Surveyors &amp; Sons." in page
     assert f"<description>{CREDIT}\nSurveyors &amp; Sons" in (folder / "placement.kml").read_text(encoding="utf-8")

@@ -156,6 +156,8 @@ class SceneGeometry:
         Streets and crossings of the map in plan; used only to name them in results.
     attribution : tuple of str
         Credits required by the sources of the scene, which results repeat.
+    assumptions : tuple of str
+        Assumptions and omissions of the model of the map, which results repeat.
 
     Examples
     --------
@@ -183,6 +185,7 @@ class SceneGeometry:
     geo_reference: GeoReference = field(default_factory=GeoReference)
     places: tuple[NamedArea, ...] = ()
     attribution: tuple[str, ...] = ()
+    assumptions: tuple[str, ...] = ()
     keep_off_areas: tuple[KeepOffArea, ...] = ()
 
     def sources(self) -> tuple[SourceCount, ...]:

@@ -47,6 +47,8 @@ class Site:
         Sources of the scene's surfaces.
     attribution : tuple of str
         Credits required by these sources.
+    assumptions : tuple of str
+        Assumptions and omissions of the model of the map.
     """
 
     name: str
@@ -59,6 +61,7 @@ class Site:
     geo_reference: GeoReference = field(default_factory=GeoReference)
     sources: tuple[SourceCount, ...] = ()
     attribution: tuple[str, ...] = ()
+    assumptions: tuple[str, ...] = ()
 
     def geographic(self, points: Float) -> Float | None:
         """Return longitude, latitude (degrees, WGS 84) and height above the map's zero of local points, all (n, 3).
@@ -132,4 +135,5 @@ def make_site(
         geo_reference=geometry.geo_reference,
         sources=geometry.sources(),
         attribution=geometry.attribution,
+        assumptions=geometry.assumptions,
     )

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Generator, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from ..arrays import Boolean, Float
 from ..choosing.placement.deployment import Sensor, deployment_of, sensor_at
-from ..choosing.placement.objective import MOVED, Objective, Solution, target_weights
+from ..choosing.placement.objective import MOVED, Objective, Solution, criterion_of, target_weights
 from ..choosing.placement.problem import Placement
 from ..choosing.robustness.gain_band import with_gain_band
 from ..errors import SeipError
@@ -21,6 +22,7 @@ from ..sensing.scans.sensor import MountedSensor
 from ..sensing.visibility.sight_lines import pose_at
 from ..sensing.visibility.visibility_model import VisibilityModel, visibility_model
 from ..site.scene_geometry import joined
+from .returns import SensorReturns
 from .survey import Layout, Survey, surroundings
 
 BY_HAND = "by hand"
@@ -77,15 +79,26 @@ def evaluate_moved_sensors(
         rows.append(visibility.see(sensor.model, sensor.xyz, sensor.orientation))
     seen = np.array(rows, dtype=bool).reshape(len(rows), len(site.targets))
     deployment = yield from with_gain_band(surroundings(survey), deployment_of(site, sensors, seen))
-    covered = float(target_weights(site, objective)[deployment.seen_by > 0].sum())
+    value = float(target_weights(site, objective)[deployment.seen_by > 0].sum())
+    notes: tuple[str, ...] = ()
+    if objective.cheapest:
+        value = deployment.price
+    elif criterion_of(objective, models) == "returns":
+        yield Progress(len(mounted), len(mounted), "returns from road users")
+        returns = SensorReturns(survey, objective)
+        each = [returns.of(one) for one in sensors]
+        summary, pedestrians = returns.summary(sensors, each), returns.near_targets(each)
+        deployment = replace(deployment, returns=summary, pedestrian_returns=pedestrians)
+        value, notes = math.log1p(summary.typical), summary.warnings()
     placement = Placement(
         chosen=np.array([sensor.pose for sensor in sensors if sensor.pose is not None], dtype=np.int64),
-        objective=deployment.price if objective.cheapest else covered,
+        objective=value,
         bound=math.nan,
         gap=math.inf,
         status=MOVED,
         solver="none",
         price=deployment.price,
+        notes=notes,
     )
     return Solution(objective, placement, None, deployment)
 

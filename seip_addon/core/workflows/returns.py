@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Generator
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -30,9 +30,10 @@ from ..sensing.returns.expected_returns import expected_returns
 from ..sensing.returns.occlusion import returns_in_traffic
 from ..sensing.returns.returns_grid import ReturnsGrid, returns_key, stored_returns
 from ..sensing.returns.road_users import BODIES, RoadUsers, road_users
+from ..sensing.scans.sensor import MountedSensor
 from ..sensing.visibility.ray_casting import engine_name, make_ray_caster
 from ..site.targets import Targets
-from .survey import Survey
+from .survey import Layout, Survey
 
 CROSSING_SHARE = 0.5
 """Share of the weight of pedestrians that is on crossings, which are 5 to 7 % of the carriageway. In simulated traffic
@@ -73,32 +74,75 @@ class SurveyReturns:
         )
 
     def summary(self, chosen: Integer) -> ReturnsSummary:
-        """Return the summary of the returns of chosen poses.
-
-        What the placement was chosen for has an allowance for traffic that hides road users. Returns from pedestrians
-        on crossings have none: they tell whether a pedestrian in plain view is detected.
-        """
-        users = self.users
-        in_plain_view = self.grid.returns[chosen].sum(axis=0, dtype=np.float64)
-        together = self.in_traffic(chosen).sum(axis=0, dtype=np.float64)
-        in_regions = weights_in_regions(self.objective, users.weight, users.central)
-        kinds = [(name, users.body == body) for body, name in enumerate(BODIES)]
-        of_each: dict[str, float] = {name: _typical(together[own], in_regions[own]) for name, own in kinds}
-        crossings = _least_on_crossings(in_plain_view, users)
-        return ReturnsSummary(_typical(together, self.weights), of_each, crossings)
+        """Return the summary of the returns of chosen poses."""
+        return summary_of(
+            self.grid.returns[chosen], self.survey.site.candidates.xyz[chosen], self.users, self.objective
+        )
 
     def solution(self, placement: Placement, greedy: Placement | None) -> Solution:
         """Return the solution of a placement that was chosen for returns."""
         survey, chosen = self.survey, placement.chosen
         summary = self.summary(chosen)
         note = f"{CHOSEN_FOR}for returns from road users: {summary.describe()} in one revolution (geometric means)"
-        pedestrians = _near_targets(survey.site.targets, self.users, self.grid, chosen)
+        pedestrians = _near_targets(survey.site.targets, self.users, self.grid.returns[chosen])
         return Solution(
             with_count(self.objective, survey.site),
             replace(placement, notes=(note, *summary.warnings(), *placement.notes)),
             greedy,
             replace(survey.deploy(chosen), returns=summary, pedestrian_returns=pedestrians),
         )
+
+
+def summary_of(returns: NDArray[np.float32], origins: Float, users: RoadUsers, objective: Objective) -> ReturnsSummary:
+    """Return the summary of the returns of sensors.
+
+    The criterion has an allowance for traffic that hides road users. Returns from pedestrians on crossings have none:
+    they tell whether a pedestrian in plain view is detected.
+
+    Parameters
+    ----------
+    returns : (k, m) float32
+        Expected returns of each sensor from each road user in plain view.
+    origins : (k, 3) float64, metres
+        Positions of the sensors, local site axes.
+    """
+    together = returns_in_traffic(returns, origins, users).sum(axis=0, dtype=np.float64)
+    in_regions = weights_in_regions(objective, users.weight, users.central)
+    kinds = [(name, users.body == body) for body, name in enumerate(BODIES)]
+    of_each: dict[str, float] = {name: _typical(together[own], in_regions[own]) for name, own in kinds}
+    crossings = _least_on_crossings(returns.sum(axis=0, dtype=np.float64), users)
+    return ReturnsSummary(_typical(together, user_weights(users, objective)), of_each, crossings)
+
+
+class SensorReturns:
+    """Expected returns from road users of sensors at any poses, for the criterion of an objective.
+
+    Parameters
+    ----------
+    layout : Layout
+        Site of the sensors.
+    """
+
+    def __init__(self, layout: Layout, objective: Objective) -> None:
+        self.users, self.objective, self._targets = road_users(layout.geometry), objective, layout.site.targets
+        self._caster = make_ray_caster(layout.site.triangles, engine_name(layout.settings.engine))
+
+    def of(self, sensor: MountedSensor) -> NDArray[np.float32]:
+        """Return the expected returns of a sensor from each road user in plain view, (m,) float32."""
+        row, _ = expected_returns(self._caster, sensor.xyz, sensor.orientation, sensor.model, self.users)
+        return row.astype(np.float32)
+
+    def summary(self, sensors: Sequence[MountedSensor], rows: Sequence[NDArray[np.float32]]) -> ReturnsSummary:
+        """Return the summary of sensors, each with its row of returns."""
+        origins = np.array([one.xyz for one in sensors]).reshape(-1, 3)
+        return summary_of(self._stacked(rows), origins, self.users, self.objective)
+
+    def near_targets(self, rows: Sequence[NDArray[np.float32]]) -> Float:
+        """Return the expected returns from the pedestrian nearest to each target, (t,) float64."""
+        return _near_targets(self._targets, self.users, self._stacked(rows))
+
+    def _stacked(self, rows: Sequence[NDArray[np.float32]]) -> NDArray[np.float32]:
+        return np.array(rows, dtype=np.float32).reshape(-1, len(self.users))
 
 
 def survey_returns(
@@ -164,13 +208,13 @@ def stored_pedestrian_returns(survey: Survey, chosen: Integer) -> Float | None:
         grid = None if survey.returns_path is None else ReturnsGrid.load(survey.returns_path)
     except SeipError:
         return None
-    return None if grid is None or grid.key != key else _near_targets(survey.site.targets, users, grid, chosen)
+    return None if grid is None or grid.key != key else _near_targets(survey.site.targets, users, grid.returns[chosen])
 
 
-def _near_targets(targets: Targets, users: RoadUsers, grid: ReturnsGrid, chosen: Integer) -> Float:
+def _near_targets(targets: Targets, users: RoadUsers, returns: NDArray[np.float32]) -> Float:
     """Return the expected returns from the pedestrian nearest to each target, (t,) float64."""
     on_foot = np.flatnonzero(users.body == BODIES.index("pedestrian"))
-    together: Float = grid.returns[np.ix_(chosen, on_foot)].sum(axis=0, dtype=np.float64)
+    together: Float = returns[:, on_foot].sum(axis=0, dtype=np.float64)
     tree = shapely.STRtree(shapely.points(users.xyz[on_foot, :2]))
     nearest: Float = together[tree.nearest(shapely.points(targets.xyz[:, :2]))]
     return nearest

@@ -137,3 +137,21 @@ def test_a_sensor_moved_by_hand_sees_what_its_rays_see(small_survey):
     below = replace(mounted, xyz=mounted.xyz * [1, 1, 0] - [0, 0, 1.0])
     with pytest.raises(SeipError, match="below the ground"):
         finish(evaluate_moved_sensors(small_survey, solution.objective, [below], {}))
+
+
+def test_sensors_that_were_chosen_for_returns_are_evaluated_by_returns_when_moved(small_survey):
+    solution = finish(place(small_survey, Objective(count=2, criterion="returns")))
+    placed = solution.deployment
+    same = finish(evaluate_moved_sensors(small_survey, solution.objective, placed.sensors, {}))
+    assert same.deployment.returns.typical == pytest.approx(placed.returns.typical, rel=1e-5)
+    assert same.deployment.returns.of_each == pytest.approx(placed.returns.of_each, rel=1e-5)
+    assert same.deployment.pedestrian_returns == pytest.approx(placed.pedestrian_returns, rel=1e-5)
+    assert same.placement.objective == pytest.approx(solution.placement.objective, rel=1e-5)
+    one = finish(evaluate_moved_sensors(small_survey, solution.objective, placed.sensors[:1], {}))
+    assert 0 < one.deployment.returns.typical < placed.returns.typical
+    far = replace(placed.sensors[0], xyz=placed.sensors[0].xyz + np.array([0.0, 0.0, 500.0]))
+    moved = finish(evaluate_moved_sensors(small_survey, solution.objective, [far, placed.sensors[1]], {}))
+    second = finish(evaluate_moved_sensors(small_survey, solution.objective, placed.sensors[1:], {}))
+    assert moved.deployment.returns.typical == pytest.approx(second.deployment.returns.typical, rel=1e-5)
+    none = finish(evaluate_moved_sensors(small_survey, solution.objective, [], {}))
+    assert none.deployment.returns.typical == 0.0

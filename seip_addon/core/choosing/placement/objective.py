@@ -272,7 +272,7 @@ def certificate(status: str, gap: float | None, *, cheapest: bool, notes: Sequen
         return MOVED_MESSAGE
     best, among = "cheapest" if cheapest else "best", f"among these candidates{purpose(notes)}."
     if status == "optimal":
-        return f"Proven: the {best} placement that there is {among}"
+        return f"Proven by the criterion: the {best} placement {among}"
     share = "an unknown share" if gap is None or not math.isfinite(gap) else f"{gap:.2%}"
     return f"Within {share} of the {best} placement possible {among}"
 

@@ -86,20 +86,43 @@ def blind_spots(targets: Targets, seen: Boolean, areas: Sequence[Area]) -> list[
 
 
 def seen_places(targets: Targets, seen_by: Integer, areas: Sequence[Area]) -> list[SeenPlace]:
-    """Return what is seen of each named area; where no street is named, of the road towards each side as well."""
-    parts = [(f"{area.name} (weighted)" if area.kind == WEIGHTED else area.name, area.within) for area in areas]
-    if not any(area.kind == PLACE for area in areas):
-        parts += _arms(targets, centres(targets, areas))
-    return [
-        SeenPlace(
-            name,
-            float(within.sum() * targets.spacing**2),
-            float((seen_by[within] > 0).mean()),
-            float((seen_by[within] > 1).mean()),
-        )
-        for name, within in parts
-        if within.any()
-    ]
+    """Return what is seen of each named area; areas may overlap.
+
+    Parameters
+    ----------
+    seen_by : (t,) int64
+        Number of sensors that see each target.
+    """
+    return [_seen(area.name, area.within, targets, seen_by) for area in areas if area.within.any()]
+
+
+def seen_streets(targets: Targets, seen_by: Integer, areas: Sequence[Area]) -> list[SeenPlace]:
+    """Return what is seen of each part of the road, and of all of it at the end.
+
+    Each target belongs to one part: to the first weighted region that contains it, otherwise to the first street, or,
+    where no street is named, to the road towards one side. Areas and shares therefore add up.
+
+    Parameters
+    ----------
+    areas : sequence of Area
+        Weighted regions and streets, without crossings.
+    """
+    streets = [(area.name, area.within) for area in areas if area.kind == PLACE]
+    if not streets:
+        streets = list(_arms(targets, centres(targets, areas)))
+    weighted = [(f"{area.name} (weighted)", area.within) for area in areas if area.kind == WEIGHTED]
+    left = np.ones(len(targets), dtype=bool)
+    parts = []
+    for name, within in (*weighted, *streets, ("Other road", left.copy())):
+        own, left = within & left, left & ~within
+        if own.any():
+            parts.append(_seen(name, own, targets, seen_by))
+    return [*parts, _seen("Total", np.ones(len(targets), dtype=bool), targets, seen_by)]
+
+
+def _seen(name: str, within: Boolean, targets: Targets, seen_by: Integer) -> SeenPlace:
+    area = float(within.sum() * targets.spacing**2)
+    return SeenPlace(name, area, float((seen_by[within] > 0).mean()), float((seen_by[within] > 1).mean()))
 
 
 def centres(targets: Targets, areas: Sequence[Area]) -> list[Centre]:
@@ -146,7 +169,9 @@ def _where(own: Integer, middle: Float, targets: Targets, areas: Sequence[Area])
     words = f"{away} the centre" + (f" of {origins[nearest].name}" if len(origins) > 1 else "")
     shares = [(int(area.within[own].sum()), area.name) for area in areas]
     most, name = max(shares, key=lambda one: one[0], default=(0, ""))
-    return f"{name}, {words}" if 2 * most >= len(own) else words
+    if 2 * most < len(own):
+        return words
+    return f"{name if most == len(own) else f'mostly {name}'}, {words}"
 
 
 def _components(places: Float) -> Integer:

@@ -35,7 +35,7 @@ from ..results.verification_text import (
     signed_points,
     vehicles,
 )
-from .blind_spots import BlindSpot, blind_spots, centres, seen_places
+from .blind_spots import BlindSpot, blind_spots, centres, seen_places, seen_streets
 from .blocks import Block, Bullets, Card, Code, Facts, Paragraph, Picture, Pictures, Report, Section, Table
 from .evidence import Evidence
 from .figures import blind_spot_map, front_chart
@@ -354,13 +354,13 @@ def _sensor_facts(evidence: Evidence, sensor: RecordedSensor, items: Mapping[str
 def _coordinates(sensor: RecordedSensor) -> Iterator[tuple[str, str]]:
     if sensor.easting_m is None or sensor.northing_m is None:
         x, y, z = sensor.map_m
-        yield "Map x, y, z", f"{x:.3f}, {y:.3f}, {z:.3f} m"
+        yield "Map x, y, z", f"{x:.1f}, {y:.1f}, {z:.1f} m"
         return
-    yield "Easting, northing", f"{sensor.easting_m:.3f}, {sensor.northing_m:.3f} m"
+    yield "Easting, northing", f"{sensor.easting_m:.1f}, {sensor.northing_m:.1f} m"
     if sensor.latitude_deg is not None and sensor.longitude_deg is not None:
-        yield "Latitude, longitude", f"{sensor.latitude_deg:.8f}°, {sensor.longitude_deg:.8f}°"
+        yield "Latitude, longitude", f"{sensor.latitude_deg:.6f}°, {sensor.longitude_deg:.6f}°"
     if sensor.altitude_m is not None:
-        yield "Altitude", f"{sensor.altitude_m:.3f} m above the map's zero"
+        yield "Altitude", f"{sensor.altitude_m:.1f} m above the zero of the map's heights"
 
 
 def _projection(evidence: Evidence) -> str:
@@ -384,18 +384,12 @@ def _places(evidence: Evidence) -> Iterator[Block]:
     yield Paragraph(
         f"{percent(coverage.whole)} of the road is seen by a sensor, {percent(coverage.seen_twice)} by two or more."
     )
-    places = seen_places(evidence.site.targets, evidence.seen_by, evidence.site.areas)
-    returns = {one.name: one.least for one in record.crossings}
-    streets = tuple(
-        (one.name, f"{one.area:,.0f}", percent(one.seen), percent(one.seen_twice))
-        for one in places
-        if one.name not in returns
-    )
-    if streets:
-        yield Table(("Street", "Area, m²", "Seen", "Twice"), streets, frozenset({1, 2, 3}))
-    crossings = tuple(
-        (one.name, percent(one.seen), returns_text(returns[one.name])) for one in places if one.name in returns
-    )
+    site, returns = evidence.site, {one.name: one.least for one in record.crossings}
+    parts = seen_streets(site.targets, evidence.seen_by, [one for one in site.areas if one.name not in returns])
+    streets = ((one.name, f"{one.area:,.0f}", percent(one.seen), percent(one.seen_twice)) for one in parts)
+    yield Table(("Street", "Area, m²", "Seen", "Twice"), tuple(streets), frozenset({1, 2, 3}))
+    places = seen_places(site.targets, evidence.seen_by, [one for one in site.areas if one.name in returns])
+    crossings = tuple((one.name, percent(one.seen), returns_text(returns[one.name])) for one in places)
     if crossings:
         yield Table(("Crossing", "Surface seen", "Points on a pedestrian"), crossings, frozenset({1, 2}))
         yield Paragraph(
@@ -620,6 +614,11 @@ def _sources(evidence: Evidence) -> Iterator[Block]:
     lines = [f"Map data: {credit}." for credit in record.site.attribution] or [
         "Map data: the scene names no source that demands a credit."
     ]
+    if any("OpenStreetMap" in credit for credit in record.site.attribution):
+        lines.append(
+            "OpenStreetMap is mostly drawn from aerial images, and may be off by several metres: set posts out from "
+            "the kerb, not by coordinates."
+        )
     if any(sensor.sensor in PAPER_TYPES for sensor in record.sensors):
         lines.append("Sensor types 1 to 3 and their prices: SEIP study of infrastructure-based collective perception.")
     version = record.versions.get("seip", "")
@@ -632,6 +631,9 @@ def _sources(evidence: Evidence) -> Iterator[Block]:
             for row in record.site.sources
         )
         yield Table(("Objects", "Source", "Number", "Assumed"), rows, frozenset({2, 3}))
+    if record.site.assumptions:
+        yield Paragraph("What was assumed or left out when the scene was built from the map:")
+        yield Bullets(tuple(sentence(note) for note in record.site.assumptions))
 
 
 def _making(evidence: Evidence) -> Iterator[Block]:

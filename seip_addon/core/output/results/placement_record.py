@@ -77,7 +77,7 @@ class RecordedGeoReference:
 class RecordedSite:
     """A scene, the map coordinates of its local origin, and what its map says of where that is.
 
-    Records of earlier versions hold no ``geo_reference``, ``sources`` and ``attribution``.
+    Records of earlier versions hold no ``geo_reference``, ``sources``, ``attribution`` and ``assumptions``.
 
     Parameters
     ----------
@@ -85,6 +85,8 @@ class RecordedSite:
         Where the scene's surfaces come from.
     attribution : tuple of str
         Credits that these sources demand.
+    assumptions : tuple of str
+        Assumptions and omissions of the model of the map.
     """
 
     name: str
@@ -92,6 +94,7 @@ class RecordedSite:
     geo_reference: RecordedGeoReference | None = None
     sources: tuple[SourceCount, ...] = ()
     attribution: tuple[str, ...] = ()
+    assumptions: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -333,7 +336,8 @@ def placement_record(
     deployment, placement, greedy = solution.deployment, solution.placement, solution.greedy
     return PlacementRecord(
         site=RecordedSite(
-            site.name, _metres(site.origin), _geo_reference(site.geo_reference), site.sources, site.attribution
+            *(site.name, _metres(site.origin), _geo_reference(site.geo_reference)),
+            *(site.sources, site.attribution, site.assumptions),
         ),
         sensors=tuple(recorded_sensor(sensor, site) for sensor in deployment.sensors),
         price_usd=_rounded(deployment.price, 2),

@@ -212,9 +212,12 @@ def _range_equation(given: Mapping[str, Any], longest: float) -> tuple[RangeEqua
     if "detection_range_m" in given:
         published = given["detection_range_m"]
         law = RangeEquation.of_ranges(published[0], [*published, published[0] * _SQRT_8][1], probability)
-        return law, "", SHEET_GAINS
-    assumed = f"its longest range, {longest:g} m, is taken to be the range at 10 % reflectivity"
-    return RangeEquation.of_ranges(longest, longest * _SQRT_8, probability), assumed, LONGEST_RANGE_GAINS
+        if "detection_probability" in given:
+            return law, "", SHEET_GAINS
+        return law, _UNSTATED.format("probability of detection"), UNSTATED_GAINS
+    assumed = f"its longest range, {longest:g} m, is taken to be the range at 10 % reflectivity; "
+    law = RangeEquation.of_ranges(longest, longest * _SQRT_8, probability)
+    return law, assumed + _UNSTATED.format("reflectivity"), UNSTATED_GAINS
 
 
 def _is_number(value: object) -> TypeGuard[float]:
@@ -278,10 +281,14 @@ def _channels(value: object) -> int:
 _CALIBRATION_SUFFIXES = {".json", ".xml", ".yaml", ".yml", ".csv"}  # of single units, as makers deliver them
 
 CALIBRATED = (1.0, 1.0)
-SHEET_GAINS = (0.3, 2.3)
-"""Gains that sweeps of one maker's sensors needed in addition to the ranges of their data sheets."""
-LONGEST_RANGE_GAINS = (0.3, 5.0)
-"""The same if a data sheet has only a longest range, assumed to be that at 10 %: two sensors needed 2.3 and 4.9."""
+SHEET_GAINS = (0.09, 2.3)
+"""Gains that sweeps needed in addition to ranges with a reflectivity and a probability of detection."""
+UNSTATED_GAINS = (0.09, 39.0)
+"""The same for ranges without one of these conditions: sweeps of three makes needed 0.09, 0.19 and 39."""
+_UNSTATED = (
+    f"its data sheet states no {{}} at its ranges, and such sensors received {UNSTATED_GAINS[0]:g} to "
+    f"{UNSTATED_GAINS[1]:g} times the power derived from them: measure one, or place it by the criterion road"
+)
 
 _LAWS = (RangeEquation.model, CarlaDropoff.model)
 _SQRT_8 = math.sqrt(8.0)

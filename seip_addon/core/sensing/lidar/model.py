@@ -215,7 +215,8 @@ class LidarModel:
         if self.calibration:
             return f"calibrated on {self.calibration}"
         low, high = self.gains
-        return f"derived from a data sheet; plausible gains {low:g} to {high:g}"
+        conditions = "without the conditions of its ranges" if self.assumed_law else "with reflectivity and probability"
+        return f"derived from a data sheet {conditions}; plausible gains {low:g} to {high:g}"
 
     def amplified(self, gain: float) -> LidarModel:
         """Return the sensor with ``gain`` times the received power; a law without power does not change."""

@@ -24,6 +24,7 @@ from .trajectories import CATEGORIES, LoadedTraffic, Trajectories
 from .vehicle_types import read_vehicle_types
 
 ROAD_MARGIN = 20.0  # metres beyond the road of the scene within which traffic is read
+_PLURAL = {"bus": "buses"}  # of categories, where it does not just add an "s"
 OVERLAP_INTERVAL = 1.0  # seconds between the instants that are searched for overlapping road users
 
 
@@ -118,7 +119,7 @@ def road_bounds(geometry: SceneGeometry, margin: float) -> tuple[float, float, f
 def describe_categories(trajectories: Trajectories) -> str:
     """Return the number of road users of each category, as text."""
     counts = Counter(user.category for user in trajectories.users)
-    return ", ".join(f"{counts[category]} {category}" for category in CATEGORIES if counts[category])
+    return ", ".join(counted(counts[one], one, _PLURAL.get(one, "")) for one in CATEGORIES if counts[one])
 
 
 def read_net_offset(path: str | os.PathLike[str]) -> Float:

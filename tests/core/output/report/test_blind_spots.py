@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from seip_addon.core.output.report.blind_spots import blind_spots, seen_places
+from seip_addon.core.output.report.blind_spots import blind_spots, seen_places, seen_streets
 from seip_addon.core.output.report.sections import failures
 from seip_addon.core.output.results.site_file import Area
 from seip_addon.core.site.targets import Targets
@@ -66,6 +66,21 @@ def test_places_have_the_shares_that_counting_gives():
     lane, none = Area("Lane", "place", np.arange(8) < 4), Area("Nowhere", "place", np.zeros(8, dtype=bool))
     (found,) = seen_places(targets, seen_by, (lane, none))
     assert (found.name, found.area, found.seen, found.seen_twice) == ("Lane", 16.0, 0.75, 0.5)
+
+
+@given(st.integers(0, 4), st.integers(0, 2), st.integers(1, 30), st.integers(0, 2**32 - 1))
+def test_each_square_belongs_to_one_street_and_the_table_adds_up(streets, weighted, count, seed):
+    random = np.random.default_rng(seed)
+    targets = targets_at([(x, 0) for x in range(count)], central=range(count // 3))
+    kinds = ["place"] * streets + ["weighted region"] * weighted
+    areas = [Area(f"A{n}", kind, random.random(count) < 0.5) for n, kind in enumerate(kinds)]
+    seen_by = random.integers(0, 4, count)
+    *parts, total = seen_streets(targets, seen_by, areas)
+    assert (total.name, total.area) == ("Total", 4.0 * count)
+    assert sum(one.area for one in parts) == total.area
+    for share, wanted in (("seen", seen_by > 0), ("seen_twice", seen_by > 1)):
+        assert getattr(total, share) == pytest.approx(wanted.mean())
+        assert sum(one.area * getattr(one, share) for one in parts) == pytest.approx(total.area * wanted.mean())
 
 
 @given(st.integers(1, 5), st.integers(1, 12), st.integers(0, 2**32 - 1))

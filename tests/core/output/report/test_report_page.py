@@ -168,8 +168,8 @@ def test_every_sensor_has_a_card_with_its_place_and_its_costs(folder):
         assert sensor.position in facts["Mounted on"]
         assert facts["Height, tilt"].startswith(f"{sensor.height_m:.2f} m above the ground, ")
         east, north = sensor.map_m[0] - 4_500_000.0, sensor.map_m[1] + 5_300_000.0
-        assert facts["Easting, northing"] == f"{east:.3f}, {north:.3f} m"
-        assert facts["Latitude, longitude"] == f"{sensor.latitude_deg:.8f}°, {sensor.longitude_deg:.8f}°"
+        assert facts["Easting, northing"] == f"{east:.1f}, {north:.1f} m"
+        assert facts["Latitude, longitude"] == f"{sensor.latitude_deg:.6f}°, {sensor.longitude_deg:.6f}°"
         assert f"sensor ${sensor.price_usd:,.0f}" in facts["Cost"]
         assert ("mounting on the pole" in facts["Cost"]) == sensor.on_pole
         assert ("Yaw" in facts) == (not sensor.all_round)
