@@ -104,18 +104,15 @@ def detect_with_all(
         Of the frames of each run.
     """
     chosen = range(len(shared.placements)) if placements is None else placements
-    numbers = [range(len(run.times))[instants] for run in runs]
-    paths = [
-        {one: _path(folder, shared, run, own, one, detector) for one in chosen}
-        for run, own in zip(runs, numbers, strict=True)
-    ]
-    missing = [[one for one, path in own.items() if not path.exists()] for own in paths]
+    sampled = [(run, numbers) for run in runs if (numbers := range(len(run.times))[instants])]
+    paths = [{one: _path(folder, shared, run, numbers, one, detector) for one in chosen} for run, numbers in sampled]
+    missing = [{one: path for one, path in files.items() if not path.exists()} for files in paths]
     if any(missing):
         yield from shared.cast(runs[0])
         works = [
-            _detect_in_run(shared, run, own, {one: files[one] for one in absent}, detector)
-            for run, own, files, absent in zip(runs, numbers, paths, missing, strict=True)
-            if absent
+            _detect_in_run(shared, run, numbers, files, detector)
+            for (run, numbers), files in zip(sampled, missing, strict=True)
+            if files
         ]
         with deterministic(1):  # all the time, as torch keeps one such setting for all threads
             yield from side_by_side(works, AT_ONCE if detector.device.type == "cpu" else 1)

@@ -8,7 +8,7 @@ pytest.importorskip("torch", reason="torch is not installed: make detection")
 
 from headless import survey
 from headless.detection.recordings import MountedSensors, Simulator, sampled_runs
-from headless.detection.shared_scans import SharedScans
+from headless.detection.shared_scans import SharedScans, detect_with_all
 from headless.options import new_parser
 
 import numpy as np
@@ -49,3 +49,9 @@ def test_frames_are_bit_for_bit_those_of_each_placement_alone(surveyed, small_sc
                 np.testing.assert_array_equal(getattr(frame, name), getattr(alone, name))
             for part in fields(Labels):
                 np.testing.assert_array_equal(getattr(frame.labels, part.name), getattr(alone.labels, part.name))
+
+
+def test_runs_that_have_no_such_frames_are_left_out(surveyed, small_scene, tmp_path):
+    runs = sampled_runs(survey.runs_beside(small_scene)[:2], surveyed.geometry.origin, 3.0)
+    shared = SharedScans(Simulator(surveyed.geometry, ScanSettings()), [MountedSensors("none", ())] * 2)
+    assert finish(detect_with_all(shared, runs, None, tmp_path, instants=slice(len(runs[0].times), None))) == [[], []]
