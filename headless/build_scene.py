@@ -146,7 +146,7 @@ def _parser() -> argparse.ArgumentParser:
         type=float,
         nargs=2,
         metavar=("X", "Y"),
-        help="centre of the site in map coordinates, metres (or latitude and longitude)",
+        help="centre of the site in map coordinates, metres",
     )
     place.add_argument(
         "--near-latlon",

@@ -43,8 +43,8 @@ from seip_addon.core.workflows.network_sites import (
     site_source,
     table_places,
 )
+from seip_addon.core.world.openstreetmap.crossings import RULES
 from seip_addon.core.world.openstreetmap.extract import Extract, read_extract
-from seip_addon.core.world.openstreetmap.network_junctions import RULES
 from seip_addon.core.world.openstreetmap.site import is_extract
 from seip_addon.core.world.openstreetmap.streets import importance, is_street
 

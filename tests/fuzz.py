@@ -171,7 +171,7 @@ def _maps(_: Path) -> list[bytes]:
 def _read_map(path: Path, _: bytes) -> None:
     from seip_addon.core.progress import finish  # noqa: PLC0415
     from seip_addon.core.world.opendrive.read import read_map  # noqa: PLC0415
-    from seip_addon.core.world.streetscape.description import describe_place  # noqa: PLC0415
+    from seip_addon.core.world.streetscape.site_file import describe_place  # noqa: PLC0415
     from tests.builders.map_models import site_model  # noqa: PLC0415
 
     _, description = describe_place(path, near=(0.0, 0.0), radius=30.0)
@@ -185,7 +185,7 @@ def _descriptions(_: Path) -> list[bytes]:
 
 
 def _read_description(path: Path, _: bytes) -> None:
-    from seip_addon.core.world.streetscape.description import read_site_description  # noqa: PLC0415
+    from seip_addon.core.world.streetscape.site_file import read_site_description  # noqa: PLC0415
 
     require_physical(read_site_description(path))
 

@@ -22,7 +22,7 @@ from ..core.workflows.site_places import SitePlaces, site_places
 from ..core.workflows.survey import lay_out
 from ..core.workflows.survey_settings import SurveySettings
 from ..core.world.openstreetmap.map_links import parsed_position
-from ..core.world.streetscape.description import DESCRIPTION_SUFFIX
+from ..core.world.streetscape.site_file import DESCRIPTION_SUFFIX
 from ..properties import traffic
 from ..properties.conversion import absolute
 from ..properties.site import ROLE_ITEMS, SEIP_PG_problem, SEIP_PG_site

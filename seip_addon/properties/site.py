@@ -20,7 +20,8 @@ from ..core.workflows.site_building import SiteRequest
 from ..core.world.elevation.at_place import TerrainRequest
 from ..core.world.openstreetmap.map_links import parsed_position
 from ..core.world.openstreetmap.site import is_extract
-from ..core.world.streetscape.description import DEFAULT_RADIUS, DESCRIPTION_SUFFIX
+from ..core.world.streetscape.description import DEFAULT_RADIUS
+from ..core.world.streetscape.site_file import DESCRIPTION_SUFFIX
 from ..preferences import overpass, sumo_folders
 from ..scene import contract, roles
 from .conversion import absolute, as_typed, of_setting

@@ -9,13 +9,13 @@ from PIL import Image, TiffImagePlugin
 
 from seip_addon.core.arrays import Float
 from seip_addon.core.storage.files import whole_file
-from seip_addon.core.world.openstreetmap.crossings import EARTH_RADIUS
 
 from .street_plan import TURN_LANE_LENGTH, Arm, StreetPlan, Tags
 
 LATITUDE, LONGITUDE = 54.2, 3.0
 """Middle of every plan, degrees: in the North Sea, without real streets, and on the central meridian of UTM zone 31."""
 TERRAIN_REACH, TERRAIN_STEP = 420.0, 2.0  # metres from the middle, and between samples
+EARTH_RADIUS = 6_371_000.0  # metres
 _SCALE, _TIE_POINT, _KEYS = 33550, 33922, 34735  # GeoTIFF's tags
 _WGS84 = 4326
 _STRAIGHT_ENTRY = 15.0  # metres that a street runs straight into a roundabout

@@ -219,13 +219,6 @@ def projection(geo_reference: str | None) -> TransverseMercator | None:
     return TransverseMercator(math.radians(latitude), math.radians(longitude), scale, easting, northing)
 
 
-def middle_of_reference(geo_reference: str | None) -> tuple[float, float] | None:
-    """Return the latitude and longitude (degrees) of a reference's origin, None without one."""
-    values = _parameters(geo_reference or "")
-    pair = [values.get(name, "") for name in ("lat_0", "lon_0")]
-    return (float(pair[0]), float(pair[1])) if all(map(_is_number, pair)) else None
-
-
 def _utm(zone: int, *, south: bool) -> TransverseMercator | None:
     if not 1 <= zone <= 60:
         return None

@@ -14,6 +14,8 @@ MIN_AREA = 1e-9  # square metres in plan; smaller triangles are vertical and cov
 _OVERLAY_GRID = 1e-4
 _TWIN_DISTANCE = 1e-9  # metres between corners that count as one
 
+_MAX_MITRE = 2.0  # largest ratio of the length of a mitre to the distance by which a line is moved
+
 _BARYCENTRIC_SLACK = 1e-6  # slack in barycentric coordinates, so that no point falls between two triangles
 
 
@@ -61,6 +63,11 @@ def closed(area: BaseGeometry, gap: float, join: Literal["mitre", "round"] = "mi
     return _without_twins(wider).buffer(-gap, join_style=join)
 
 
+def opened(area: BaseGeometry, width: float) -> BaseGeometry:
+    """Return an area in plan without parts narrower than ``width`` metres; corners of more than 23 degrees stay."""
+    return area.buffer(-width / 2, join_style="mitre").buffer(width / 2, join_style="mitre")  # morphological opening
+
+
 def _without_twins(area: BaseGeometry) -> BaseGeometry:
     """Return an area with distinct corners: unions leave some that differ only by rounding.
 
@@ -72,6 +79,24 @@ def _without_twins(area: BaseGeometry) -> BaseGeometry:
         return area
     # A union on a grid may touch itself in a corner, which is not valid and cannot be rounded again.
     return shapely.set_precision(area if area.is_valid else area.buffer(0), _TWIN_DISTANCE)
+
+
+def travelled(line: Float) -> Float:
+    """Return the distance in plan from the start of a line (n, 2 or 3) to each of its points, (n,) metres."""
+    return np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line[:, :2], axis=0).T))])
+
+
+def beside(line: Float, aside: float) -> Float:
+    """Return a line (n, 2 or 3) moved to its left by ``aside`` metres in plan, with mitred corners."""
+    steps = np.diff(line[:, :2], axis=0)
+    units = steps / np.maximum(np.hypot(*steps.T), 1e-9)[:, None]
+    before, after = np.concatenate([units[:1], units]), np.concatenate([units, units[-1:]])
+    # The normals of both pieces at a corner, (a + b) / (1 + a·b), have the offset of both edges: the mitre.
+    cosine = (before * after).sum(axis=1, keepdims=True)
+    along = (before + after) / np.maximum(1.0 + cosine, 2.0 / _MAX_MITRE**2)
+    moved = line.copy()
+    moved[:, :2] += aside * np.column_stack([-along[:, 1], along[:, 0]])
+    return moved
 
 
 def covered_share(area: BaseGeometry, others: shapely.STRtree) -> float:

@@ -45,7 +45,7 @@ RULES: dict[RuleName, Rule] = {
     "driveways": Rule("Driveways", "on a driveway"),
     "landings": Rule("Crossing landings", "on a crossing landing"),
     "private": Rule("Private ground", "on private ground"),
-    "islands": Rule("Narrow islands", f"on an island narrower than {MIN_ISLAND_WIDTH:g} m"),
+    "islands": Rule("Islands", f"on an island narrower than {MIN_ISLAND_WIDTH:g} m, or on one of an extract"),
     "power-poles": Rule("Power poles", "power poles"),
 }
 """Rules in order of application: a position is counted for the first rule that excludes it."""

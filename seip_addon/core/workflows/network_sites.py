@@ -25,8 +25,8 @@ from ..limits import LATITUDE, LONGITUDE, WEIGHT, Limits
 from ..progress import Progress
 from ..site.roles import Role
 from ..storage.files import digest, read_small
+from ..world.openstreetmap.crossings import SAME_JUNCTION, metres, selected_junctions
 from ..world.openstreetmap.extract import Extract, Tags, cropped, read_extract, window
-from ..world.openstreetmap.network_junctions import SAME_JUNCTION, metres, selected_junctions
 from ..world.openstreetmap.site import STREET_REACH, ExtractPlace
 from ..world.streetscape.model import SiteModel
 from ..world.streetscape.parts import Part

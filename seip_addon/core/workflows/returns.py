@@ -21,7 +21,7 @@ from ..choosing.placement.objective import (
     with_count,
 )
 from ..choosing.placement.problem import Placement, PlacementProblem
-from ..choosing.placement.returns_summary import CrossingReturns, ReturnsSummary
+from ..choosing.placement.returns_summary import ENOUGH_RETURNS, CrossingReturns, ReturnsSummary
 from ..choosing.placement.search_limits import SolverLimits
 from ..choosing.placement.solver import solve, solve_greedy
 from ..errors import SeipError
@@ -110,8 +110,12 @@ def summary_of(returns: NDArray[np.float32], origins: Float, users: RoadUsers, o
     in_regions = weights_in_regions(objective, users.weight, users.central)
     kinds = [(name, users.body == body) for body, name in enumerate(BODIES)]
     of_each: dict[str, float] = {name: _typical(together[own], in_regions[own]) for name, own in kinds}
-    crossings = _least_on_crossings(returns.sum(axis=0, dtype=np.float64), users)
-    return ReturnsSummary(_typical(together, user_weights(users, objective)), of_each, crossings)
+    clear = returns.sum(axis=0, dtype=np.float64)
+    enough: dict[str, float] = {
+        name: float(np.average(clear[own] >= ENOUGH_RETURNS[name], weights=in_regions[own])) for name, own in kinds
+    }
+    typical = _typical(together, user_weights(users, objective))
+    return ReturnsSummary(typical, of_each, _least_on_crossings(clear, users), enough=enough)
 
 
 class SensorReturns:

@@ -34,11 +34,11 @@ from ..world.openstreetmap.site import (
     surroundings_of_map,
 )
 from ..world.streetscape import road_surface
-from ..world.streetscape.description import DEFAULT_RADIUS, SiteDescription, describe_place
-from ..world.streetscape.geographic_position import in_metres
+from ..world.streetscape.description import DEFAULT_RADIUS, SiteDescription
 from ..world.streetscape.levels import UnclearLevelError
 from ..world.streetscape.model import SiteModel, street_model
 from ..world.streetscape.place import SCENE_MARGIN, Place
+from ..world.streetscape.site_file import describe_place
 from ..world.streetscape.street_map import StreetMap, opendrive_streets
 
 DOWNLOAD_MARGIN = 200.0  # metres beyond the streets that are laid out: `site_of_extract` reads no more
@@ -279,7 +279,6 @@ def _of_map(source: Path, request: SiteRequest) -> tuple[Path, RoadMap, SiteDesc
 
 def _where(streets: StreetMap, description: SiteDescription) -> tuple[Float, float]:
     """Return the centre of a site, (2,) metres, and the largest distance of its region from there."""
-    description, _ = in_metres(description, streets.road_map, streets.lanes)
     place = Place(streets.road_map, streets.lanes, description, streets.junctions)
     x_low, y_low, x_high, y_high = place.within.bounds
     x, y = place.centre.tolist()

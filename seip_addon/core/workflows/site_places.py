@@ -13,7 +13,8 @@ from ..world.openstreetmap.crossings import Crossing, named_crossings
 from ..world.openstreetmap.extract import read_extract
 from ..world.openstreetmap.site import is_extract
 from ..world.openstreetmap.street_plan import StreetPlan, street_plan
-from ..world.streetscape.description import DEFAULT_RADIUS, describe_place
+from ..world.streetscape.description import DEFAULT_RADIUS
+from ..world.streetscape.site_file import describe_place
 
 ROADS_PER_STEP = 20
 

@@ -145,6 +145,8 @@ def test_sensors_that_were_chosen_for_returns_are_evaluated_by_returns_when_move
     same = finish(evaluate_moved_sensors(small_survey, solution.objective, placed.sensors, {}))
     assert same.deployment.returns.typical == pytest.approx(placed.returns.typical, rel=1e-5)
     assert same.deployment.returns.of_each == pytest.approx(placed.returns.of_each, rel=1e-5)
+    assert same.deployment.returns.enough == placed.returns.enough
+    assert 0 < min(placed.returns.enough.values()) <= max(placed.returns.enough.values()) <= 1
     assert same.deployment.pedestrian_returns == pytest.approx(placed.pedestrian_returns, rel=1e-5)
     assert same.placement.objective == pytest.approx(solution.placement.objective, rel=1e-5)
     one = finish(evaluate_moved_sensors(small_survey, solution.objective, placed.sensors[:1], {}))

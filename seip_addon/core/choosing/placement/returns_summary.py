@@ -2,12 +2,17 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 FEW_RETURNS = 5.0
 """Number of returns from a pedestrian below which a warning names the crossing."""
 FEW = f"fewer than {FEW_RETURNS:g} returns from a pedestrian"
 """Beginning of that warning."""
+
+ENOUGH_RETURNS = {"car": 12.0, "cyclist": 8.0, "pedestrian": 8.0}
+"""Returns from which on the shipped detector finds about nine in ten road users of each kind (docs/detection.md)."""
+GOOD_SHARE, FAIR_SHARE = 0.95, 0.8
+"""Shares of the places with enough returns from which a placement is called good, and fair."""
 
 SURFACE_SEEN = (
     "Seen means that the surface of the road itself is measured. People and vehicles reflect more light and are "
@@ -81,6 +86,9 @@ class ReturnsSummary:
         The same mean for each kind of road user.
     crossings : tuple of CrossingReturns
         Returns from a pedestrian at each crossing.
+    enough : mapping of str to float
+        Share of the places, by weight, where a road user of each kind in plain view returns at least `ENOUGH_RETURNS`;
+        records of earlier versions lack it.
     front : tuple of ReturnsPoint
         Best placements found with fewer and more sensors, see `front_of`. Empty if they were not searched for.
 
@@ -92,12 +100,26 @@ class ReturnsSummary:
     '494 returns from a car and 3.6 from a pedestrian'
     >>> returns.warnings()
     ('fewer than 5 returns from a pedestrian at the worst point of: Rope Lane (4.9)',)
+    >>> ReturnsSummary(36.2, {}, (), enough={"car": 0.994, "pedestrian": 0.93}).verdict()
+    'A car in plain view returns 12 points or more at 99% of its places, a pedestrian 8 or more at 93%: fair.'
     """
 
     typical: float
     of_each: Mapping[str, float]
     crossings: tuple[CrossingReturns, ...]
     front: tuple[ReturnsPoint, ...] = ()
+    enough: Mapping[str, float] = field(default_factory=dict)
+
+    def verdict(self) -> str:
+        """Return where road users return enough points to be detected, and how good that is, as a sentence or ""."""
+        if not self.enough:
+            return ""
+        (name, share), *others = self.enough.items()
+        first = f"A {name} in plain view returns {ENOUGH_RETURNS[name]:g} points or more at {share:.0%} of its places"
+        parts = [first, *(f"a {one} {ENOUGH_RETURNS[one]:g} or more at {share:.0%}" for one, share in others)]
+        worst = min(self.enough.values())
+        word = "good" if worst >= GOOD_SHARE else "fair" if worst >= FAIR_SHARE else "poor"
+        return f"{', '.join(parts)}: {word}."
 
     def describe(self) -> str:
         """Return the number of returns from each kind of road user as text, with its unit."""

@@ -199,6 +199,7 @@ def _summary(evidence: Evidence) -> str:
     if coverage.central is not None:
         parts.append(f"Of the most important part ({_central(evidence)}), {percent(coverage.central)} is seen.")
     if record.returns is not None:
+        parts += filter(None, [record.returns.verdict()])
         of_each = record.returns.of_each
         named = [f"{returns_text(number)} points on a {name}" for name, number in of_each.items()]
         parts.append(

@@ -116,7 +116,8 @@ def _certificate(record: PlacementRecord) -> str:
 def _achievement(record: PlacementRecord) -> str:
     if record.returns is None:
         return f"{record.coverage.whole:.1%} of the road is seen."
-    return f"{_quality(record)} from a road user in each revolution: {record.returns.describe_each()}."
+    typical = f"{_quality(record)} from a road user in each revolution: {record.returns.describe_each()}."
+    return " ".join(filter(None, (record.returns.verdict(), typical)))
 
 
 def _outlook(record: PlacementRecord) -> str:

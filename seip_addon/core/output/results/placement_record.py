@@ -445,7 +445,8 @@ def _rounded_returns(returns: ReturnsSummary) -> ReturnsSummary:
         )
         for one in returns.front
     )
-    return ReturnsSummary(_rounded(returns.typical, 3), of_each, _rounded_crossings(returns.crossings), front)
+    enough = {name: _share(share) for name, share in returns.enough.items()}
+    return ReturnsSummary(_rounded(returns.typical, 3), of_each, _rounded_crossings(returns.crossings), front, enough)
 
 
 def _rounded_crossings(crossings: Iterable[CrossingReturns]) -> tuple[CrossingReturns, ...]:

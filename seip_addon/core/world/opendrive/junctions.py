@@ -3,6 +3,7 @@
 import difflib
 from collections.abc import Iterable
 
+import numpy as np
 import shapely
 from shapely import Point
 from shapely.geometry.base import BaseGeometry
@@ -54,8 +55,25 @@ def find_junction(road_map: RoadMap, surfaces: Iterable[LaneSurface], id_or_name
         ids = ", ".join(junction.id for junction in found)
         raise SeipError(f"several junctions are called {id_or_name!r}; choose one by its id: {ids}")
     if not any(surface.junction_id == found[0].id for surface in surfaces):
-        raise SeipError(f"junction {id_or_name!r} has no lanes; choose another junction or a place on the map")
+        raise _no_lanes(road_map, found[0], id_or_name)
     return found[0]
+
+
+def _no_lanes(road_map: RoadMap, junction: Junction, called: str) -> SeipError:
+    """Return the error of a junction without lanes, with the place where its roads meet if it may have none."""
+    ends = [
+        road.frame(np.array([s])).origin[0]
+        for road in road_map.roads
+        for link, s in ((road.predecessor, 0.0), (road.successor, road.length))
+        if link is not None and (link.kind, link.id) == ("junction", junction.id)
+    ]
+    if not junction.kind or not ends:
+        return SeipError(f"junction {called!r} has no lanes; choose another junction or a place on the map")
+    x, y, _ = np.mean(ends, axis=0)
+    return SeipError(
+        f"junction {called!r} is a {junction.kind} one, which has no lanes of its own: give the place where its roads "
+        f"meet, --near {x:.0f} {y:.0f}"
+    )
 
 
 def streets_of_junctions(road_map: RoadMap, surfaces: Iterable[LaneSurface]) -> dict[str, tuple[str, ...]]:

@@ -109,6 +109,9 @@ class LateralShape:
         return heights
 
 
+FLAT = LateralShape(np.empty(0), ())  # the shape of a road that is flat across
+
+
 def lateral_shape(records: list[tuple[float, float, tuple[float, float, float, float]]]) -> LateralShape:
     """Return the shape of ``(s, t, (a, b, c, d))`` records in any order."""
     stations = sorted({s for s, _, _ in records})

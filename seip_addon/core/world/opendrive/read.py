@@ -5,7 +5,6 @@ Written after ASAM OpenDRIVE 1.4 to 1.8; attributes that a file leaves out have 
 
 import math
 import os
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,19 +13,15 @@ from ... import limits
 from ...errors import SeipError
 from .document import Node, read_document
 from .profile import ZERO_PROFILE, Profile, lateral_shape, profile
+from .read_objects import read_objects, read_signals
 from .reference_line import Clothoid, Cubic, Piece, ReferenceLine, param_poly3, poly3
 from .road_map import (
-    Corner,
     Junction,
     Lane,
     LaneSection,
-    ObjectOutline,
-    Repeat,
     Road,
     RoadLink,
     RoadMap,
-    RoadObject,
-    RoadSignal,
 )
 
 _OTHER_FORMATS = {
@@ -40,8 +35,6 @@ ATTRIBUTION = "attribution"
 """Code of the header's ``<userData>`` whose value is a credit."""
 
 _MAX_ROAD_LENGTH = limits.ROAD_LENGTH.most
-_MAX_OBJECT_DISTANCE = limits.SITE_RADIUS.most  # metres that an object reaches, and stands from its road
-_MAX_OBJECT_HEIGHT = limits.ABOVE_GROUND.most
 _MAX_TURN = 200.0 * math.pi  # radians within one geometry; a hundred turns
 _MAX_STRETCH, _SLACK = 2.0, 10.0
 """Multiple of its length, and metres, from its start beyond which no point of a road lies unless a number is wrong."""
@@ -60,7 +53,8 @@ def read_map(path: str | os.PathLike[str]) -> RoadMap:
     if root.tag != "OpenDRIVE":
         other = _OTHER_FORMATS.get(root.tag, "")
         raise SeipError(f"{root.place} is not OpenDRIVE: it begins with <{root.tag}>{other}; choose an .xodr file")
-    roads = tuple(_road(node.within(f"road {node.text('id')}")) for node in root.children("road"))
+    nodes = [node.within(f"road {node.text('id')}") for node in root.children("road")]
+    roads = tuple(map(_road, nodes))
     if not roads:
         raise SeipError(f"{root.place} has no roads; choose an OpenDRIVE map with at least one <road>")
     header = root.child("header")
@@ -72,13 +66,20 @@ def read_map(path: str | os.PathLike[str]) -> RoadMap:
         else np.zeros(4),
         geo_reference=((reference.element.text or "").strip() or None) if reference else None,
         roads=roads,
-        junctions=tuple(Junction(node.text("id"), node.text("name", "")) for node in root.children("junction")),
+        junctions=tuple(map(_junction, root.children("junction"))),
+        objects=tuple(one for pair in zip(roads, nodes, strict=True) for one in read_objects(*pair)),
+        signals=tuple(one for pair in zip(roads, nodes, strict=True) for one in read_signals(*pair)),
         attribution=tuple(
             node.text("value", "")
             for node in (header.children("userData") if header else ())
             if node.text("code", "") == ATTRIBUTION and node.text("value", "")
         ),
     )
+
+
+def _junction(node: Node) -> Junction:
+    kind = node.text("type", "")
+    return Junction(node.text("id"), node.text("name", ""), kind if kind in ("direct", "virtual") else "")
 
 
 def _road(node: Node) -> Road:
@@ -99,13 +100,6 @@ def _road(node: Node) -> Road:
         ),
         lane_offset=_profile(node, "lanes", "laneOffset"),
         sections=_sections(node, line.end),
-        objects=tuple(
-            _object(child.within(f"object {child.text('id', '')}")) for child in node.children("objects", "object")
-        ),
-        signals=tuple(
-            _signal(child.within(f"signal {child.text('id', '')}"), node.text("id"))
-            for child in node.children("signals", "signal")
-        ),
         predecessor=_link(node, "predecessor"),
         successor=_link(node, "successor"),
     )
@@ -266,88 +260,3 @@ def _height(lane: Node, edge: str, start: float) -> Profile:
         for height, following, begin, stop in zip(heights, heights[1:], s, s[1:], strict=False)
     ]
     return profile([(at, (height, rise, 0.0, 0.0)) for at, height, rise in zip(s, heights, [*rises, 0.0], strict=True)])
-
-
-def _object(node: Node) -> RoadObject:
-    outlines = (*node.children("outline"), *node.children("outlines", "outline"))
-    obj = RoadObject(
-        id=node.text("id", ""),
-        name=node.text("name", ""),
-        kind=node.text("type", "none").lower(),
-        s=node.number("s"),
-        t=node.number("t", most=_MAX_OBJECT_DISTANCE),
-        z_offset=node.number("zOffset", 0.0, most=_MAX_OBJECT_HEIGHT),
-        heading=node.number("hdg", 0.0),
-        pitch=node.number("pitch", 0.0),
-        roll=node.number("roll", 0.0),
-        length=node.number("length", 0.0, most=_MAX_OBJECT_DISTANCE),
-        width=node.number("width", 0.0, most=_MAX_OBJECT_DISTANCE),
-        height=node.number("height", 0.0, most=_MAX_OBJECT_HEIGHT),
-        radius=node.number("radius", 0.0, most=_MAX_OBJECT_DISTANCE),
-        outlines=tuple(filter(lambda outline: outline.corners, map(_outline, outlines))),
-        repeats=(),
-    )
-    return replace(obj, repeats=tuple(_repeat(child, obj) for child in node.children("repeat")))
-
-
-def _outline(node: Node) -> ObjectOutline:
-    corners = (Node(element, node.place) for element in node.element)
-    return ObjectOutline(
-        tuple(_corner(corner) for corner in corners if corner.tag in ("cornerRoad", "cornerLocal")),
-        node.flag("closed", default=True),
-    )
-
-
-def _corner(node: Node) -> Corner:
-    on_road = node.tag == "cornerRoad"
-    along, aside, up = ("s", "t", "dz") if on_road else ("u", "v", "z")
-    return Corner(
-        on_road,
-        node.number(along) if on_road else node.number(along, most=_MAX_OBJECT_DISTANCE),
-        node.number(aside, most=_MAX_OBJECT_DISTANCE),
-        node.number(up, 0.0, most=_MAX_OBJECT_HEIGHT),
-        node.number("height", most=_MAX_OBJECT_HEIGHT) if "height" in node.element.attrib else None,
-    )
-
-
-def _repeat(node: Node, obj: RoadObject) -> Repeat:
-    distance = node.number("distance", 0.0)
-    if distance < 0.0:
-        raise SeipError(f"{node.place}: distance={distance:g} of <repeat> is below zero; correct it in the map")
-
-    def pair(name: str, own: float, most: float = _MAX_OBJECT_DISTANCE) -> tuple[float, float]:
-        start = node.number(f"{name}Start", own, most=most)
-        return start, node.number(f"{name}End", start, most=most)
-
-    return Repeat(
-        s=node.number("s", obj.s),
-        length=node.number("length", 0.0),
-        distance=distance,
-        t=pair("t", obj.t),
-        z_offset=pair("zOffset", obj.z_offset, _MAX_OBJECT_HEIGHT),
-        height=pair("height", obj.height, _MAX_OBJECT_HEIGHT),
-        width=pair("width", obj.width),
-        object_length=pair("length", obj.length),
-        radius=pair("radius", obj.radius),
-    )
-
-
-def _signal(node: Node, road_id: str) -> RoadSignal:
-    turned = math.pi if node.text("orientation", "none") == "-" else 0.0
-    on_map = node.child("positionInertial")
-    elsewhere = None if on_map else node.child("positionRoad")
-    stands = elsewhere or node
-    return RoadSignal(
-        road_id=elsewhere.text("roadId") if elsewhere else road_id,
-        id=node.text("id", ""),
-        name=node.text("name", ""),
-        kind=node.text("type", ""),
-        dynamic=node.flag("dynamic"),
-        s=stands.number("s"),
-        t=stands.number("t"),
-        z_offset=stands.number("zOffset", 0.0),
-        heading=turned + stands.number("hOffset", 0.0),
-        place=None
-        if on_map is None
-        else (on_map.number("x"), on_map.number("y"), on_map.number("z"), on_map.number("hdg", 0.0)),
-    )

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...arrays import Float
-from .profile import LateralShape, Profile
+from .objects import PlacedObject, PlacedSignal
+from .profile import FLAT, ZERO_PROFILE, LateralShape, Profile
 from .reference_line import ReferenceLine
 
 MIDDLE_STEP = 10.0  # metres along a road between the candidates for the middle of a map
@@ -15,10 +16,11 @@ MIDDLE_STEP = 10.0  # metres along a road between the candidates for the middle 
 
 @dataclass(frozen=True)
 class Junction:
-    """A junction by its ``id`` and its ``name``, which may be empty."""
+    """A junction by its ``id`` and its ``name``, which may be empty; ``kind`` is ``direct`` or ``virtual``, or ""."""
 
     id: str
     name: str
+    kind: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,92 +62,6 @@ class LaneSection:
 
 
 @dataclass(frozen=True)
-class Corner:
-    """A corner of an object's outline.
-
-    ``along`` and ``aside`` are s and t of the road (`on_road`) or u and v of the object, ``up`` is dz or z, all in
-    metres; ``height`` is None if the file does not give it.
-    """
-
-    on_road: bool
-    along: float
-    aside: float
-    up: float
-    height: float | None
-
-
-@dataclass(frozen=True)
-class ObjectOutline:
-    """Corners of an outline in their order, and whether it is closed."""
-
-    corners: tuple[Corner, ...]
-    closed: bool
-
-
-@dataclass(frozen=True)
-class Repeat:
-    """A row of copies of an object, or a continuous strip if ``distance`` is zero.
-
-    Each pair holds the values at the start and the end of the row, in metres.
-    """
-
-    s: float
-    length: float
-    distance: float
-    t: tuple[float, float]
-    z_offset: tuple[float, float]
-    height: tuple[float, float]
-    width: tuple[float, float]
-    object_length: tuple[float, float]
-    radius: tuple[float, float]
-
-
-@dataclass(frozen=True)
-class RoadObject:
-    """An object as in the file, in road coordinates (metres, radians)."""
-
-    id: str
-    name: str
-    kind: str
-    s: float
-    t: float
-    z_offset: float
-    heading: float
-    pitch: float
-    roll: float
-    length: float
-    width: float
-    height: float
-    radius: float
-    outlines: tuple[ObjectOutline, ...]
-    repeats: tuple[Repeat, ...]
-
-
-@dataclass(frozen=True)
-class RoadSignal:
-    """A signal as in the file, in the coordinates of the road on which it stands (metres, radians).
-
-    Parameters
-    ----------
-    road_id : str
-        Road on which it stands, which may differ from the road that it applies to.
-    place : (x, y, z, heading) or None
-        Position, if the file gives it in map coordinates.
-    """
-
-    road_id: str
-    id: str
-    name: str
-    kind: str
-    dynamic: bool
-    s: float
-    t: float
-    z_offset: float
-    heading: float
-    place: tuple[float, float, float, float] | None
-
-
-@dataclass(frozen=True)
 class RoadLink:
     """Link at an end of a road to a ``junction``, or to the ``start`` or ``end`` of a ``road``, by its id."""
 
@@ -156,7 +72,7 @@ class RoadLink:
 
 @dataclass(frozen=True, eq=False)
 class Road:
-    """A road: its reference line in plan, the profiles along it, its objects and its signals.
+    """A road: its reference line in plan, and the profiles along it.
 
     Parameters
     ----------
@@ -181,14 +97,12 @@ class Road:
     keeps_left: bool
     reference_line: ReferenceLine
     elevation: Profile
-    superelevation: Profile
-    left_crossfall: Profile
-    right_crossfall: Profile
-    shape: LateralShape
-    lane_offset: Profile
-    sections: tuple[LaneSection, ...]
-    objects: tuple[RoadObject, ...]
-    signals: tuple[RoadSignal, ...]
+    superelevation: Profile = ZERO_PROFILE
+    left_crossfall: Profile = ZERO_PROFILE
+    right_crossfall: Profile = ZERO_PROFILE
+    shape: LateralShape = FLAT
+    lane_offset: Profile = ZERO_PROFILE
+    sections: tuple[LaneSection, ...] = ()
     predecessor: RoadLink | None = None
     successor: RoadLink | None = None
 
@@ -273,6 +187,10 @@ class RoadMap:
         Roads in the order of the file.
     junctions : tuple of Junction
         Junctions in the order of the file.
+    objects : tuple of PlacedObject
+        Objects, with repeated ones as often as they are repeated.
+    signals : tuple of PlacedSignal
+        Signals.
     attribution : tuple of str
         Credits in the header's ``<userData code="attribution">``.
 
@@ -297,6 +215,8 @@ class RoadMap:
     geo_reference: str | None
     roads: tuple[Road, ...]
     junctions: tuple[Junction, ...]
+    objects: tuple[PlacedObject, ...] = ()
+    signals: tuple[PlacedSignal, ...] = ()
     attribution: tuple[str, ...] = ()
 
     def junctions_with_roads(self) -> tuple[Junction, ...]:

@@ -1,7 +1,8 @@
-"""Buildings of an extract: footprints, parts, heights and roofs.
+"""Buildings of an extract: footprints, parts and heights.
 
-Heights and roofs follow the Simple 3D Buildings scheme of the OpenStreetMap wiki: ``height`` is the height of the
-ridge, ``min_height`` that of the foot of the walls, and parts replace the outline that contains them.
+Heights follow the Simple 3D Buildings scheme of the OpenStreetMap wiki: ``height`` is the height of the ridge,
+``min_height`` that of the foot of the walls, and parts replace the outline that contains them. Roofs are flat, at the
+height of the ridge.
 """
 
 import math
@@ -17,7 +18,6 @@ from ...geometry.plan import without
 from ...site.scene_geometry import FROM_EXTRACT
 from ..streetscape.clearing import CLEARANCE
 from ..streetscape.description import Building
-from ..streetscape.roofs import FLAT, RIDGED, SLOPED, Roof
 from .extract import Relation, Tags, Way
 from .plan_shapes import DRAWN_TWICE, PlanShapes, polygons
 from .quantities import count, metres
@@ -36,7 +36,7 @@ MIN_KNOWN = 5  # buildings of known height from which on their median is assumed
 NO_BUILDINGS = {"no", "none", "proposed", "construction", "ruins", "demolished", "razed", "abandoned:building"}
 NO_PARTS = {"no", "balcony", "steps", "ramp", "base"}
 SLAB = 0.4  # metres: thickness of a roof that stands on posts
-USUAL_ROOF = 2.5  # metres: height of a roof without one, and at most half of the building's
+USUAL_ROOF = 2.5  # metres: height of a pitched roof without one
 PASSAGE_REACH = 8.0  # metres from the middle of a street through a building to the edge of its carriageway at most
 FULLY_PARTED = 0.1  # share of an outline outside its parts from which on the rest is a separate building
 _NOWHERE = shapely.Polygon()
@@ -161,7 +161,11 @@ def known_height(tags: Tags) -> float | None:
     levels = count(tags.get("building:levels"), MAX_LEVELS)
     if not levels:
         return None
-    return levels * STOREY + (_roof_height(tags) or USUAL_ROOF if _is_roofed(tags) else 0.0)
+    roof = 0.0
+    if tags.get("roof:shape", "flat") != "flat":
+        storeys = count(tags.get("roof:levels"), MAX_LEVELS) or 0.0
+        roof = metres(tags.get("roof:height"), MAX_HEIGHT) or storeys * STOREY or USUAL_ROOF
+    return levels * STOREY + roof
 
 
 def _foot(tags: Tags) -> float:
@@ -193,41 +197,4 @@ def _building(outline: shapely.Polygon, tags: Tags, usual: float, least: float, 
         if not is_part or least:
             return None
         base, height = 0.0, max(base, height)
-    roof = 0.0
-    if _is_roofed(tags) and not canopy:
-        roof = min(_roof_height(tags) or min(USUAL_ROOF, (height - base) / 2), height - base)
-    return Building(
-        outline,
-        height - base,
-        base,
-        roof=Roof(tags["roof:shape"], roof, _heading(tags), tags.get("roof:orientation") == "across") if roof else FLAT,
-        source=FROM_EXTRACT,
-        height_assumed=not is_known,
-    )
-
-
-def _is_roofed(tags: Tags) -> bool:
-    return tags.get("roof:shape", "flat") in RIDGED | SLOPED
-
-
-def _roof_height(tags: Tags) -> float | None:
-    """Return the height of a roof from its tags, metres; None without one."""
-    own = metres(tags.get("roof:height"), MAX_HEIGHT)
-    levels = count(tags.get("roof:levels"), MAX_LEVELS)
-    return own or (levels * STOREY if levels else None)
-
-
-_POINTS = ("N", "NNE", "NE", "ENE", "E", "ESE", "SE", "SSE", "S", "SSW", "SW", "WSW", "W", "WNW", "NW", "NNW")
-
-
-def _heading(tags: Tags) -> float | None:
-    """Return the downward direction of a roof, radians counter-clockwise from east; None without a tag."""
-    text = tags.get("roof:direction", "").upper()
-    if text in _POINTS:
-        bearing = 22.5 * _POINTS.index(text)
-    else:
-        given = count(text, 360.0)
-        if given is None:
-            return None
-        bearing = given
-    return math.radians(90.0 - bearing)
+    return Building(outline, height - base, base, source=FROM_EXTRACT, height_assumed=not is_known)

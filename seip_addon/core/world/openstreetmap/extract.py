@@ -3,7 +3,7 @@
 import itertools
 import math
 import re
-from collections.abc import Generator, Mapping, Sequence
+from collections.abc import Generator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import MappingProxyType
@@ -430,47 +430,6 @@ def window(latitude: float, longitude: float, reach: float) -> Window:
     north = math.degrees(reach / EARTH_RADIUS)
     east = north / math.cos(math.radians(latitude))
     return latitude - north, longitude - east, latitude + north, longitude + east
-
-
-def rings(ways: Sequence[Way]) -> tuple[list[list[int]], int]:
-    """Join ways end to end to closed rings of node ids.
-
-    Returns
-    -------
-    rings : list of list of int
-        Rings, without the first node repeated at the end.
-    open : int
-        Number of ways that are not part of a ring.
-    """
-    lines = [way.nodes for way in ways if len(way.nodes) > 1]
-    at: dict[int, list[int]] = {}  # the ways that end at a node
-    for index, line in enumerate(lines):
-        for end in {line[0], line[-1]}:
-            at.setdefault(end, []).append(index)
-    # Follow unused ways from end to start until the ring closes or no way continues it. Ways may point in either
-    # direction. Used ways are removed from the front of their lists, so that each is looked at only a few times.
-    used = [False] * len(lines)
-    found, left = [], 0
-    for first, line in enumerate(lines):
-        if used[first]:
-            continue
-        ring, joined = list(line), 1
-        used[first] = True
-        while ring[0] != ring[-1]:
-            ends = at[ring[-1]]
-            while ends and used[ends[0]]:
-                ends.pop(0)
-            if not ends:
-                break
-            following = lines[ends[0]]
-            used[ends[0]] = True
-            ring += (following if following[0] == ring[-1] else following[::-1])[1:]
-            joined += 1
-        if ring[0] == ring[-1] and len(ring) > 3:
-            found.append(ring[:-1])
-        else:
-            left += joined
-    return found, left
 
 
 def _first_bytes(path: Path) -> bytes:

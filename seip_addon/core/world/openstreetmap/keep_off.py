@@ -12,13 +12,11 @@ from ...site.post_rules import RULES, KeepOffArea, RuleName
 from ..streetscape.description import SideWay, Wall
 from ..streetscape.map_furniture import LANDING_DEPTH
 from .extract import Relation, Tags, Way
+from .mapped_crossings import MAX_CROSSING_LENGTH, crossed_places, crossing_width
 from .plan_shapes import PlanShapes
-from .quantities import metres
 from .streets import is_street
 
-CROSSING_WIDTH, MAX_CROSSING_WIDTH = 4.0, 15.0  # metres: of a crossing without a width, and of any
 CROSSING_REACH = 8.0  # metres by which a mapped crossing may end before the kerb, or beyond it
-MAX_CROSSING_LENGTH = 30.0
 PUBLIC = {"yes", "public", "permissive", "designated"}
 PUBLIC_GARDENS = {"botanical", "community", "public"}
 NOT_PUBLIC = {"private", "no", "customers", "permit", "residents", "delivery"}
@@ -82,22 +80,14 @@ def _landings(shapes: PlanShapes, area: BaseGeometry, carriageway: BaseGeometry)
             if not carriageway.intersects(shapely.LineString(line)):
                 continue  # it crosses a driveway
             yield _corridor(_extended(line), way.tags).intersection(kerbside)
-    for way, line in shapes.lines(area, "highway", None):
-        if not is_street(way.tags, service=True) or len(line) != len(way.nodes):
-            continue
-        for index, number in enumerate(way.nodes):
-            tags = shapes.extract.nodes[number].tags
-            if tags.get("highway") != "crossing" or tags.get("crossing") == "no" or number in crossed:
-                continue
-            # A single node has no direction across the street: take the normal to the chord of its neighbours, long
-            # enough for any street, and keep the parts of the strip near the node. Others lie on a different
-            # carriageway.
-            before, after = line[max(index - 1, 0)], line[min(index + 1, len(line) - 1)]
-            along = (after - before) / (np.hypot(*(after - before)) or 1.0)
-            aside = MAX_CROSSING_LENGTH / 2 * np.array([-along[1], along[0]])
-            across = _corridor(np.array([line[index] - aside, line[index] + aside]), tags)
-            reached = across.intersection(carriageway.buffer(LANDING_DEPTH))
-            here = shapely.Point(line[index])
+    streets = (way for way, _ in shapes.lines(area, "highway", None) if is_street(way.tags, service=True))
+    for one in crossed_places(streets, shapes):
+        if one.node not in crossed:
+            # A strip that is long enough for any street; other parts of it lie on a different carriageway.
+            aside = MAX_CROSSING_LENGTH / 2 * np.array([-one.along[1], one.along[0]])
+            across = shapely.LineString([one.middle - aside, one.middle + aside])
+            reached = across.buffer(one.depth / 2, cap_style="flat").intersection(carriageway.buffer(LANDING_DEPTH))
+            here = shapely.Point(one.middle)
             yield from (
                 part.intersection(kerbside) for part in shapely.get_parts(reached) if part.dwithin(here, LANDING_DEPTH)
             )
@@ -115,8 +105,7 @@ def _extended(line: Float) -> Float:
 
 
 def _corridor(line: Float, tags: Tags) -> BaseGeometry:
-    width = metres(tags.get("width"), MAX_CROSSING_WIDTH) or CROSSING_WIDTH
-    return shapely.LineString(line).buffer(width / 2, cap_style="flat")
+    return shapely.LineString(line).buffer(crossing_width(tags) / 2, cap_style="flat")
 
 
 def _private_areas(shapes: PlanShapes, area: BaseGeometry) -> Iterator[BaseGeometry]:

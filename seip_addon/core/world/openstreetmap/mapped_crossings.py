@@ -4,7 +4,7 @@ import itertools
 import math
 import re
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,13 +17,14 @@ from ..opendrive.objects import PlacedObject
 from ..streetscape.named_places import ASSUMED_CROSSING
 from ..streetscape.road_surface import CARRIAGEWAY, MAX_SEAM, in_groups
 from ..streetscape.street_map import StreetMap
-from .extract import Extract
-from .keep_off import CROSSING_WIDTH, MAX_CROSSING_LENGTH, MAX_CROSSING_WIDTH
+from .extract import Extract, Tags, Way
 from .network_map import crossing
 from .plan_shapes import PlanShapes
 from .quantities import metres
 from .streets import StreetFile
 
+CROSSING_WIDTH, MAX_CROSSING_WIDTH = 4.0, 15.0  # metres: of a crossing without a width, and of any
+MAX_CROSSING_LENGTH = 30.0
 MAPPED_AROUND = 40.0  # metres from a mapped crossing within which no crossing is guessed
 MAX_AWAY = 15.0  # metres from a crossing to the lanes of its street: in the map these end where a junction begins
 ALONG_STREET = math.radians(30.0)  # between a crossed street and its lanes
@@ -32,7 +33,7 @@ _GUESSED_AT = re.compile(r":(.*)_c\d+")
 
 
 @dataclass(frozen=True, eq=False)
-class _Crossed:
+class Crossed:
     """A mapped crossing: its node, middle (2,), direction of the street (2,) and extent along it, metres."""
 
     node: int
@@ -56,7 +57,7 @@ def with_mapped_crossings(streets: StreetMap, source: StreetFile, shapes: PlanSh
         Shapes of the extract in map coordinates.
     """
     driven = [lane for lane in in_groups(streets.lanes, CARRIAGEWAY) if lane.junction_id is None]
-    mapped = [_on_carriageway(one, driven) for one in _crossed_places(source, shapes)]
+    mapped = [_on_carriageway(one, driven) for one in crossed_places(source.ways.values(), shapes)]
     places = shapely.multipoints(np.array([one.position[:2] for one in mapped]).reshape(-1, 2))
     joints = {one.id for one in streets.junctions if one.is_joint}
     guessed = [
@@ -76,11 +77,11 @@ def guessed_crossings(streets: StreetMap, area: BaseGeometry) -> int:
     return int(shapely.intersects(area, places).sum())
 
 
-def _crossed_places(streets: StreetFile, shapes: PlanShapes) -> Iterator[_Crossed]:
+def crossed_places(streets: Iterable[Way], shapes: PlanShapes) -> Iterator[Crossed]:
     """Yield the places where streets are crossed: nodes tagged as crossings, and nodes shared with a crossing way."""
     extract = shapes.extract
     widths = dict(_crossing_nodes(extract))
-    ways = [way for way in streets.ways.values() if "highway" in way.tags]
+    ways = [way for way in streets if "highway" in way.tags]
     # Number of street segments at each node: a node with more than two is a junction.
     arms = Counter(itertools.chain.from_iterable(pair for way in ways for pair in itertools.pairwise(way.nodes)))
     done: set[int] = set()
@@ -98,21 +99,25 @@ def _crossed_places(streets: StreetFile, shapes: PlanShapes) -> Iterator[_Crosse
             )
             length = float(np.hypot(*(after - before)))
             if length > 0.0:
-                yield _Crossed(number, middle, (after - before) / length, widths[number])
+                yield Crossed(number, middle, (after - before) / length, widths[number])
 
 
 def _crossing_nodes(extract: Extract) -> Iterator[tuple[int, float]]:
     """Yield the nodes that are crossings, and the extent of each along the street, metres."""
     for way in extract.ways.values():
         if "crossing" in (way.tags.get(key) for key in ("footway", "cycleway", "path")):
-            width = metres(way.tags.get("width"), MAX_CROSSING_WIDTH) or CROSSING_WIDTH
-            yield from ((number, width) for number in way.nodes)
+            yield from ((number, crossing_width(way.tags)) for number in way.nodes)
     for number, node in extract.nodes.items():
         if node.tags.get("highway") == "crossing" and node.tags.get("crossing") != "no":
-            yield number, metres(node.tags.get("width"), MAX_CROSSING_WIDTH) or CROSSING_WIDTH
+            yield number, crossing_width(node.tags)
 
 
-def _on_carriageway(crossed: _Crossed, lanes: Sequence[LaneSurface]) -> PlacedObject:
+def crossing_width(tags: Tags) -> float:
+    """Return the width of a crossing along the street, metres."""
+    return metres(tags.get("width"), MAX_CROSSING_WIDTH) or CROSSING_WIDTH
+
+
+def _on_carriageway(crossed: Crossed, lanes: Sequence[LaneSurface]) -> PlacedObject:
     """Return a crossing that spans the carriageway of its street from edge to edge.
 
     Its width is measured where the lanes of the street are nearest: in the map, a junction may begin before it.
@@ -145,7 +150,7 @@ def _on_carriageway(crossed: _Crossed, lanes: Sequence[LaneSurface]) -> PlacedOb
     return _crossing(crossed, crossed.middle, 2 * CROSSING_WIDTH)
 
 
-def _crossing(crossed: _Crossed, middle: Float, width: float) -> PlacedObject:
+def _crossing(crossed: Crossed, middle: Float, width: float) -> PlacedObject:
     across = width / 2 * np.array([-crossed.along[1], crossed.along[0]])
     return crossing(f"crossing {crossed.node}", "", np.array([middle - across, middle + across]), crossed.depth)
 

@@ -1,7 +1,6 @@
 """Streets of a network that SUMO's netconvert made of an extract: lanes, junctions, crossings and signals.
 
-A network has lanes as centre lines with a width, and junctions, their pavements and crossings as areas. It is read with
-the package's own XML reader: the module sumolib is not part of every installation of SUMO.
+A network has lanes as centre lines with a width, and junctions, their pavements and crossings as areas.
 """
 
 import itertools
@@ -9,9 +8,8 @@ import math
 import re
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
-from xml.sax.saxutils import unescape
 
 import numpy as np
 import shapely
@@ -19,107 +17,50 @@ from shapely.geometry.base import BaseGeometry
 
 from ...arrays import Float
 from ...errors import SeipError
-from ...geometry.plan import closed, united, without
-from ...progress import finish
-from ...storage.xml_stream import Attributes, read_tags
+from ...geometry.plan import beside, closed, opened, travelled, united, without
 from ..opendrive.lanes import LaneSurface
-from ..opendrive.objects import PlacedObject
-from ..opendrive.profile import ZERO_PROFILE, LateralShape, Profile
+from ..opendrive.objects import PlacedObject, PlacedSignal
+from ..opendrive.profile import Profile
 from ..opendrive.reference_line import Clothoid, ReferenceLine
 from ..opendrive.road_map import Junction, Road, RoadLink, RoadMap
-from ..opendrive.signals import PlacedSignal
 from ..streetscape.intersections import SAME_DIRECTION
 from ..streetscape.named_places import CROSSING
+from ..streetscape.road_surface import CARRIAGEWAY, in_groups
 from ..streetscape.street_map import JunctionArea, Profiles, StreetMap
+from ..traffic_simulation.street_network import (
+    LANE_WIDTH,
+    MIN_STEP,
+    NetworkLane,
+    StreetNetwork,
+    read_network,
+    shape_points,
+)
 
 _LANE = re.compile(r'(<lane id=")([^"]*)("[^>]*? shape=")([^"]*)"')
-QUOTES = {"&apos;": "'", "&quot;": '"'}
 _Areas = defaultdict[str, list[BaseGeometry]]
 PRECISION = 3  # decimal places of coordinates, metres
+WALK_STEP = 2.0  # metres between the points of a pavement that is moved to a mapped sidewalk
+MAX_WALK_SHIFT = 8.0  # metres by which it is moved at most
+MIN_WALKED = 0.5  # share of it along which the sidewalk must run
 MIN_ARMS = 3  # arms of a junction; where fewer meet, a street continues
 ARM_GAP = 2.0  # metres between two ends of carriageways of one arm at most
 MAX_MERGING = 4  # ends of edges where the directions of one street divide: two of each direction
-LANE_WIDTH = 3.2  # metres: SUMO's width of lanes without one
-CROSSING_WIDTH = 4.0  # metres: the same of crossings
-SLIVER = 0.3  # metres: parts of a junction up to twice this wide between its pavements are no carriageway
+SLIVER = 0.6  # metres: narrower parts of a junction between its pavements are no carriageway
 CORNER = 2.0  # metres that the carriageway of a junction extends beyond the lanes through it, at most
 BIKE_LANE = 0.75  # half the width of a cycle lane, metres: between lanes through a junction
-MIN_STEP = 1e-3  # metres between points of a line: closer ones are one point
 MIN_LENGTH = 0.1  # metres: shorter lanes within junctions have no direction
-MAX_MITRE = 2.0  # length of a corner's offset in widths, at most
 LAMP_HEIGHT = 5.0  # metres above the road
 RAILS = {"tram", "rail_urban", "rail", "rail_electric", "rail_fast"}
 ROAD_VEHICLES = {"passenger", "bus", "delivery", "truck", "taxi", "private", "motorcycle"}
 
 
-@dataclass(eq=False)
+@dataclass(frozen=True, eq=False)
 class _Lane:
-    """A lane: its type as in OpenDRIVE, "" without a surface, its width in metres, and its line (n, 3)."""
+    """A lane of a road: its type as in OpenDRIVE, "" without a surface, its width in metres, and its line (n, 3)."""
 
     type: str
     width: float
     line: Float
-
-
-@dataclass(eq=False)
-class _Edge:
-    """An edge of the network, with its lanes by their number from the kerb."""
-
-    id: str
-    function: str
-    begin: str
-    end: str
-    name: str
-    lanes: dict[int, _Lane] = field(default_factory=dict)
-
-
-class _Reader:
-    """Handler of a stream of XML that collects the elements of a network."""
-
-    def __init__(self, name: str) -> None:
-        self.name = name
-        self.left_hand = False
-        self.offset, self.projection = np.zeros(2), ""
-        self.edges: dict[str, _Edge] = {}
-        self.shapes: dict[str, Float] = {}
-        self.connections: list[Attributes] = []
-        self._current = ""
-
-    def lane(self, number: str) -> _Lane:
-        """Return a lane by its id: that of its edge, and its number there."""
-        edge, _, index = number.rpartition("_")
-        return self.edges[edge].lanes[int(index)]
-
-    def read_element(self, tag: str, given: Attributes) -> None:
-        """Read an element; an error names the file."""
-        try:
-            self._read(tag, given)
-        except (KeyError, ValueError) as error:
-            raise self.invalid(error) from error
-
-    def invalid(self, error: Exception) -> SeipError:
-        """Return the error of an invalid network."""
-        return SeipError(f"{self.name} is not a valid SUMO network ({error}); write it again with netconvert")
-
-    def _read(self, tag: str, given: Attributes) -> None:
-        if tag == "net":
-            self.left_hand = given.get("lefthand") == "true"
-        elif tag == "location":
-            self.offset = np.array(given["netOffset"].split(","), dtype=np.float64)
-            self.projection = given["projParameter"]
-        elif tag == "edge":
-            self._current = given["id"]
-            function, begin, end, name = (given.get(key, "") for key in ("function", "from", "to", "name"))
-            # netconvert escapes the names of streets twice: "Smith & Sons" arrives as "Smith &amp; Sons".
-            self.edges[self._current] = _Edge(self._current, function, begin, end, unescape(name, QUOTES))
-        elif tag == "lane":
-            default = CROSSING_WIDTH if self.edges[self._current].function == "crossing" else LANE_WIDTH
-            lane = _Lane(_type(given), float(given.get("width", default)), _points(given["shape"]))
-            self.edges[self._current].lanes[int(given["index"])] = lane
-        elif tag == "junction" and given.get("type") != "internal" and given.get("shape"):
-            self.shapes[given["id"]] = _points(given["shape"])
-        elif tag == "connection":
-            self.connections.append(given)
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,7 +88,7 @@ class NetworkMap:
             number, low, high = self.pieces.get(match[2], ("", 0.0, 1.0))
             if number not in profiles:
                 return match[0]
-            line = _points(match[4])
+            line = shape_points(match[4])
             along, heights = profiles[number]
             if len(line) < 2:
                 return match[0]
@@ -156,11 +97,59 @@ class NetworkMap:
             shares = np.unique(np.concatenate([own, bends[(bends > 0.0) & (bends < 1.0)]]))
             x, y = (np.interp(shares, own, line[:, axis]) for axis in (0, 1))
             z = np.interp((low + (high - low) * shares) * along[-1], along, heights)
-            rows = np.column_stack([x, y, z]).tolist()
-            shape = " ".join(",".join(f"{value:.{PRECISION}f}" for value in row) for row in rows)
-            return f'{match[1]}{match[2]}{match[3]}{shape}"'
+            return f'{match[1]}{match[2]}{match[3]}{_shape(np.column_stack([x, y, z]))}"'
 
         return _LANE.sub(raised, self.text)
+
+    def walking_on(self, sidewalks: BaseGeometry) -> "NetworkMap":
+        """Return the network with its pavements moved to mapped sidewalks along them, given as lines.
+
+        A mapped sidewalk within the carriageway says no more than that the pavement is narrow.
+        """
+        about = sidewalks.buffer(MAX_WALK_SHIFT)
+        shapely.prepare(about)
+        areas = [lane.polygon for lane in in_groups(self.streets.lanes, CARRIAGEWAY)]
+        areas += [one.carriageway for one in self.streets.junctions]
+        carriageway = united(area for area in areas if about.intersects(area))
+        shapely.prepare(carriageway)
+        mapped = without(sidewalks, carriageway.buffer(WALK_STEP / 2))
+
+        def moved(match: re.Match[str]) -> str:
+            if match[2].startswith(":") or ' allow="pedestrian"' not in match[3]:
+                return match[0]
+            line = _moved_walk(shape_points(match[4]), mapped, carriageway)
+            if line is None or carriageway.intersects(shapely.LineString(line)):
+                return match[0]
+            return f'{match[1]}{match[2]}{match[3]}{_shape(line)}" customShape="1"'
+
+        return self if mapped.is_empty else replace(self, text=_LANE.sub(moved, self.text))
+
+
+def _moved_walk(line: Float, mapped: BaseGeometry, carriageway: BaseGeometry) -> Float | None:
+    """Return the line of a pavement (n, 3), moved sideways to mapped sidewalks; None if none runs along most of it."""
+    places: Float = shapely.get_coordinates(shapely.segmentize(shapely.LineString(line), WALK_STEP), include_z=True)
+    if len(places) < 2:
+        return None
+    plan = places[:, :2]
+    ways = shapely.shortest_line(shapely.points(plan), mapped)
+    aside = shapely.get_coordinates(ways)[1::2] - plan
+    along = np.gradient(plan, axis=0)
+    along /= np.maximum(np.hypot(*along.T), MIN_STEP)[:, None]
+    # Beyond the end of a mapped sidewalk, the way to it leads along the street: there the line keeps its distance.
+    known = (np.hypot(*aside.T) < MAX_WALK_SHIFT) & (np.abs((aside * along).sum(axis=1)) < WALK_STEP / 2)
+    known &= ~shapely.intersects(carriageway, ways)
+    if known.mean() < MIN_WALKED:
+        return None
+    left = (aside * np.column_stack([-along[:, 1], along[:, 0]])).sum(axis=1)
+    by = np.interp(np.arange(len(plan)), np.flatnonzero(known), left[known])
+    places[:, :2] += by[:, None] * np.column_stack([-along[:, 1], along[:, 0]])
+    return places
+
+
+def _shape(line: Float) -> str:
+    """Return the text of a line (n, 3), without heights if all are zero."""
+    rows = (line if line[:, 2].any() else line[:, :2]).tolist()
+    return " ".join(",".join(f"{value:.{PRECISION}f}" for value in row) for row in rows)
 
 
 def credited(text: str, attribution: Iterable[str]) -> str:
@@ -187,56 +176,49 @@ def read_network_map(path: Path) -> NetworkMap:
     SeipError
         The file cannot be read or is not a network.
     """
-    reader = _Reader(path.name)
+    network = read_network(path)
+    pieces = {
+        f"{edge.id}_{lane.index}": (edge.id, 0.0, 1.0)
+        for edge in (*network.edges.values(), *network.inside.values())
+        for lane in edge.lanes
+    }
     try:
-        finish(read_tags(path, reader.read_element))
-        pieces = {f"{edge.id}_{index}": (edge.id, 0.0, 1.0) for edge in reader.edges.values() for index in edge.lanes}
-        streets = _streets(reader, pieces)
-    except KeyError as error:
-        raise reader.invalid(error) from error
+        streets = _streets(network, pieces)
+    except (KeyError, IndexError) as error:
+        raise SeipError(f"{path.name} is not a valid SUMO network ({error}); write it again with netconvert") from error
     if not streets.lanes:
         raise SeipError(f"{path.name} is a SUMO network without streets; write it again with netconvert")
     return NetworkMap(streets, path.read_text(encoding="utf-8"), pieces)
 
 
-def _streets(reader: _Reader, pieces: dict[str, tuple[str, float, float]]) -> StreetMap:
-    roads = list(_roads(reader, pieces))
+def _streets(network: StreetNetwork, pieces: dict[str, tuple[str, float, float]]) -> StreetMap:
+    roads = list(_roads(network, pieces))
     road_map = RoadMap(
         name="",
-        header_offset=np.array([*-reader.offset, 0.0, 0.0]),
-        geo_reference=reader.projection,
+        header_offset=np.array([*-network.offset, 0.0, 0.0]),
+        geo_reference=network.projection,
         roads=tuple(road for road, _ in roads),
-        junctions=tuple(Junction(number, number) for number in reader.shapes),
+        junctions=tuple(Junction(number, number) for number in network.shapes),
     )
     lanes = tuple(itertools.chain.from_iterable(lanes for _, lanes in roads))
-    areas = tuple(_junction_areas(reader, lanes, frozenset(_joints(reader))))
-    return StreetMap(road_map, lanes, tuple(_crossings(reader)), tuple(_signals(reader)), areas)
+    areas = tuple(_junction_areas(network, lanes, frozenset(_joints(network))))
+    return StreetMap(road_map, lanes, tuple(_crossings(network)), tuple(_signals(network)), areas)
 
 
-def _points(shape: str) -> Float:
-    """Return the points (n, 3) of a shape, without repeated ones."""
-    rows = [[float(value) for value in point.split(",")] for point in shape.split()]
-    points: Float = np.array([(*row, 0.0)[:3] for row in rows])
-    steps = np.hypot(*np.diff(points[:, :2], axis=0).T)
-    apart: Float = points[np.concatenate([[True], steps > MIN_STEP])]
-    return apart
-
-
-def _type(given: Attributes) -> str:
+def _type(lane: NetworkLane) -> str:
     """Return the lane type of OpenDRIVE that a lane with some permissions has, "" if it has no surface."""
-    allowed, closed = (set(given.get(key, "").split()) for key in ("allow", "disallow"))
-    if allowed == {"pedestrian"}:
+    if lane.allowed == {"pedestrian"}:
         return "sidewalk"
-    if allowed == {"bicycle"}:
+    if lane.allowed == {"bicycle"}:
         return "biking"
-    if allowed and "all" not in allowed:
-        if allowed & ROAD_VEHICLES:
+    if lane.allowed and "all" not in lane.allowed:
+        if lane.allowed & ROAD_VEHICLES:
             return "driving"
-        return "tram" if allowed & RAILS else ""
-    return "" if "all" in closed else "driving"
+        return "tram" if lane.allowed & RAILS else ""
+    return "" if "all" in lane.closed else "driving"
 
 
-def _joints(reader: _Reader) -> Iterator[str]:
+def _joints(network: StreetNetwork) -> Iterator[str]:
     """Yield the junctions where no more than two arms meet, so that a street only continues.
 
     Carriageways of both directions are one arm if they leave in one direction next to each other, as where a median
@@ -244,17 +226,17 @@ def _joints(reader: _Reader) -> Iterator[str]:
     """
     neighbours: defaultdict[str, set[str]] = defaultdict(set)
     ends: defaultdict[str, list[tuple[shapely.LineString, float]]] = defaultdict(list)
-    for edge in reader.edges.values():
-        driven = [lane for lane in edge.lanes.values() if lane.type not in ("", "sidewalk") and len(lane.line) > 1]
-        if edge.function or not driven:
+    for edge in network.edges.values():
+        driven = [lane for lane in edge.lanes if _type(lane) not in ("", "sidewalk") and len(lane.line) > 1]
+        if not driven:
             continue
-        neighbours[edge.begin].add(edge.end)
-        neighbours[edge.end].add(edge.begin)
-        for node, row, onward in ((edge.begin, 0, 1), (edge.end, -1, -2)):
+        neighbours[edge.from_node].add(edge.to_node)
+        neighbours[edge.to_node].add(edge.from_node)
+        for node, row, onward in ((edge.from_node, 0, 1), (edge.to_node, -1, -2)):
             outer, inner = driven[0].line, driven[-1].line
-            x, y = (inner[onward] - inner[row])[:2]
-            ends[node].append((shapely.LineString([outer[row, :2], inner[row, :2]]), math.atan2(y, x)))
-    for node in reader.shapes:
+            x, y = inner[onward] - inner[row]
+            ends[node].append((shapely.LineString([outer[row], inner[row]]), math.atan2(y, x)))
+    for node in network.shapes:
         across = shapely.union_all([line.buffer((LANE_WIDTH + ARM_GAP) / 2) for line, _ in ends[node]])
         arms = max(len(shapely.get_parts(across)), _directions([heading for _, heading in ends[node]]))
         if arms < MIN_ARMS and (len(neighbours[node]) < MIN_ARMS or len(ends[node]) <= MAX_MERGING):
@@ -270,51 +252,57 @@ def _directions(headings: Sequence[float]) -> int:
     return len(found)
 
 
-def _roads(reader: _Reader, pieces: dict[str, tuple[str, float, float]]) -> Iterator[tuple[Road, list[LaneSurface]]]:
+def _roads(
+    network: StreetNetwork, pieces: dict[str, tuple[str, float, float]]
+) -> Iterator[tuple[Road, list[LaneSurface]]]:
     """Yield the roads outside and within junctions, with their lanes; add the roads of internal lanes to ``pieces``."""
-    for edge in reader.edges.values():
-        if not edge.function:
-            links = tuple(RoadLink("junction", node) for node in (edge.begin, edge.end))
-            lanes = {number: lane for number, lane in edge.lanes.items() if lane.type and len(lane.line) > 1}
-            if lanes:
-                yield _road(edge.id, edge.name, None, lanes, links, left_hand=reader.left_hand)
-    joints = frozenset(_joints(reader))
-    for (number, before, after), lanes in _connecting(reader, pieces).items():
-        junction = reader.edges[before].end
+    for edge in network.edges.values():
+        links = tuple(RoadLink("junction", node) for node in (edge.from_node, edge.to_node))
+        own = {
+            lane.index: _Lane(_type(lane), lane.width, lane.points)
+            for lane in edge.lanes
+            if _type(lane) and len(lane.line) > 1
+        }
+        if own:
+            yield _road(edge.id, edge.name, None, own, links, left_hand=network.left_hand)
+    joints = frozenset(_joints(network))
+    for (number, before, after), lanes in _connecting(network, pieces).items():
+        junction = network.edges[before].to_node
         links = (RoadLink("road", before, "end"), RoadLink("road", after, "start"))
-        road, surfaces = _road(number, "", junction, lanes, links, left_hand=reader.left_hand)
+        road, surfaces = _road(number, "", junction, lanes, links, left_hand=network.left_hand)
         # Where a street only continues, its lanes are those of the street.
         yield road, [replace(one, junction_id=None) for one in surfaces] if junction in joints else surfaces
 
 
 def _connecting(
-    reader: _Reader, pieces: dict[str, tuple[str, float, float]]
+    network: StreetNetwork, pieces: dict[str, tuple[str, float, float]]
 ) -> dict[tuple[str, str, str], dict[int, _Lane]]:
     """Return the lanes within junctions by road: the first internal edge, and the edges before and after it."""
     # A turn on which vehicles wait inside the junction has several internal lanes in a row.
-    onward = {f"{one['from']}_{one['fromLane']}": one for one in reader.connections if one["from"].startswith(":")}
+    onward = {f"{one['from']}_{one['fromLane']}": one for one in network.connections if one["from"].startswith(":")}
     found: dict[tuple[str, str, str], dict[int, _Lane]] = {}
-    for one in reader.connections:
+    for one in network.connections:
         via = one.get("via")
         if one["from"].startswith(":") or via is None:
             continue
         first, _, index = via.rpartition("_")
-        if reader.edges[first].function != "internal":
+        if network.inside[first].function != "internal":
             continue
         chain = []
         while via is not None:
             chain.append(via)
             via = onward[via].get("via") if via in onward else None
-        parts = [reader.lane(one).line for one in chain]
-        ends = np.concatenate([[0.0], np.cumsum([max(_length(part), MIN_STEP) for part in parts])])
+        parts = [network.lane(one).points for one in chain]
+        ends = np.concatenate([[0.0], np.cumsum([max(travelled(part)[-1], MIN_STEP) for part in parts])])
         ends /= ends[-1]
         pieces |= {one: (first, *span) for one, span in zip(chain, itertools.pairwise(ends.tolist()), strict=True)}
         line = np.concatenate(parts)
         line = line[np.concatenate([[True], np.hypot(*np.diff(line[:, :2], axis=0).T) > MIN_STEP])]
-        source, target = (reader.lane(f"{one[end]}_{one[f'{end}Lane']}") for end in ("from", "to"))
-        if _length(line) > MIN_LENGTH and source.type and target.type:
+        source, target = (network.lane(f"{one[end]}_{one[f'{end}Lane']}") for end in ("from", "to"))
+        kinds = {_type(source), _type(target)}
+        if travelled(line)[-1] > MIN_LENGTH and "" not in kinds:
             # A cycle lane that leads into a driving lane ends where the junction begins.
-            kind = source.type if source.type == target.type else "driving"
+            kind = kinds.pop() if len(kinds) == 1 else "driving"
             lanes = found.setdefault((first, one["from"], one["to"]), {})
             lanes[int(index)] = _Lane(kind, min(source.width, target.width), line)
     return found
@@ -338,7 +326,8 @@ def _road(
         np.column_stack([np.interp(rows, share, lanes[one].line[:, axis]) for axis in range(3)])
         for one, share in zip(order, shares, strict=True)
     )
-    edges = [_edges(line, lanes[one].width) for one, line in zip(order, lines, strict=True)]
+    halves = [lanes[one].width / 2 for one in order]
+    edges = [(beside(line, half), beside(line, -half)) for line, half in zip(lines, halves, strict=True)]
     reference = edges[0][1 if left_hand else 0]
     steps = np.hypot(*np.diff(reference[:, :2], axis=0).T)
     s = np.concatenate([[0.0], np.cumsum(np.maximum(steps, MIN_STEP))])
@@ -360,56 +349,34 @@ def _road(
         keeps_left=left_hand,
         reference_line=line,
         elevation=elevation,
-        superelevation=ZERO_PROFILE,
-        left_crossfall=ZERO_PROFILE,
-        right_crossfall=ZERO_PROFILE,
-        shape=LateralShape(np.empty(0), ()),
-        lane_offset=ZERO_PROFILE,
-        sections=(),
-        objects=(),
-        signals=(),
         predecessor=links[0],
         successor=links[1],
     )
     return road, [surface for surface in surfaces if len(surface.triangles)]
 
 
-def _length(line: Float) -> float:
-    return float(np.hypot(*np.diff(line[:, :2], axis=0).T).sum())
-
-
 def _shares(line: Float) -> Float:
     """Return how far along a line (n, 3) each point is, (n,) from 0 to 1."""
-    travelled = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line[:, :2], axis=0).T))])
-    return np.asarray(travelled / travelled[-1])
+    along = travelled(line)
+    return np.asarray(along / along[-1])
 
 
-def _edges(line: Float, width: float) -> tuple[Float, Float]:
-    """Return the left and right edge (n, 3) of a lane along its centre line (n, 3), with mitred corners."""
-    steps = np.diff(line[:, :2], axis=0)
-    units = steps / np.maximum(np.hypot(*steps.T), 1e-9)[:, None]
-    before, after = np.concatenate([units[:1], units]), np.concatenate([units, units[-1:]])
-    # The normals of both pieces at a corner, (a + b) / (1 + a·b), have the offset of both edges: the mitre.
-    cosine = (before * after).sum(axis=1, keepdims=True)
-    along = (before + after) / np.maximum(1.0 + cosine, 2.0 / MAX_MITRE**2)
-    aside = np.column_stack([-along[:, 1], along[:, 0], np.zeros(len(line))]) * width / 2
-    return line + aside, line - aside
-
-
-def _junction_areas(reader: _Reader, lanes: Sequence[LaneSurface], joints: frozenset[str]) -> Iterator[JunctionArea]:
+def _junction_areas(
+    network: StreetNetwork, lanes: Sequence[LaneSurface], joints: frozenset[str]
+) -> Iterator[JunctionArea]:
     """Yield the areas of the junctions."""
     roads, walking, driven = defaultdict[str, set[str]](set), _Areas(list), _Areas(list)
-    for edge in reader.edges.values():
+    for edge in network.inside.values():
         if edge.function == "walkingarea":
-            walking[edge.id[1:].rpartition("_w")[0]] += [_polygon(lane.line) for lane in edge.lanes.values()]
-        elif not edge.function:
-            roads[edge.begin].add(edge.id)
-            roads[edge.end].add(edge.id)
+            walking[edge.id[1:].rpartition("_w")[0]] += [_polygon(lane.line) for lane in edge.lanes]
+    for edge in network.edges.values():
+        roads[edge.from_node].add(edge.id)
+        roads[edge.to_node].add(edge.id)
     for lane in lanes:
         if lane.junction_id is not None:
             roads[lane.junction_id].add(lane.road_id)
             driven[lane.junction_id] += [lane.polygon] * (lane.lane_type == "driving")
-    for node, shape in reader.shapes.items():
+    for node, shape in network.shapes.items():
         whole = _polygon(shape)
         area = _driven_area(without(whole, united(walking[node])), united(driven[node]))
         walked = united([*walking[node], without(whole, area)])
@@ -422,8 +389,7 @@ def _driven_area(area: BaseGeometry, lanes: BaseGeometry) -> BaseGeometry:
     Pavements of edges shorter than the junction reach into it, and some between wide angles lie beyond it: the
     carriageway is where vehicles drive, and a little more at corners where none turns.
     """
-    # Morphological opening: where a pavement does not quite reach the outline of the junction, slivers are left.
-    area = area.buffer(-SLIVER, join_style="mitre").buffer(SLIVER, join_style="mitre")
+    area = opened(area, SLIVER)  # where a pavement does not quite reach the outline of the junction
     if lanes.is_empty:
         return area
     filled = united(shapely.Polygon(part.exterior) for part in shapely.get_parts(closed(lanes, BIKE_LANE)))
@@ -436,12 +402,12 @@ def _polygon(line: Float) -> BaseGeometry:
     return shapely.union_all([part for part in parts if shapely.get_dimensions(part) == 2])
 
 
-def _crossings(reader: _Reader) -> Iterator[PlacedObject]:
+def _crossings(network: StreetNetwork) -> Iterator[PlacedObject]:
     """Yield the crossings that netconvert guesses, as areas across the street."""
-    for edge in reader.edges.values():
+    for edge in network.inside.values():
         if edge.function == "crossing":
-            for lane in edge.lanes.values():
-                yield crossing(edge.id, "", lane.line[:, :2], lane.width)
+            for lane in edge.lanes:
+                yield crossing(edge.id, "", lane.line, lane.width)
 
 
 def crossing(number: str, name: str, line: Float, depth: float) -> PlacedObject:
@@ -454,18 +420,18 @@ def crossing(number: str, name: str, line: Float, depth: float) -> PlacedObject:
     return PlacedObject("", number, name, CROSSING, position, heading, 0.0, 0.0, depth, width, 0.0, 0.0, ())
 
 
-def _signals(reader: _Reader) -> Iterator[PlacedSignal]:
+def _signals(network: StreetNetwork) -> Iterator[PlacedSignal]:
     """Yield the traffic lights: one at the end of each lane that leads into a junction with signals."""
     seen = set()
-    for one in reader.connections:
+    for one in network.connections:
         lane = (one["from"], one.get("fromLane", ""))
-        edge = reader.edges.get(one["from"])
-        if "tl" in one and lane not in seen and edge is not None and not edge.function:
+        edge = network.edges.get(one["from"])
+        if "tl" in one and lane not in seen and edge is not None:
             seen.add(lane)
             own = edge.lanes[int(lane[1])]
-            if own.type in ("driving", "tram") and len(own.line) > 1:
-                x, y = (own.line[-1] - own.line[-2])[:2]
-                position = own.line[-1] + [0.0, 0.0, LAMP_HEIGHT]
+            if _type(own) in ("driving", "tram") and len(own.line) > 1:
+                x, y = own.line[-1] - own.line[-2]
+                position = own.points[-1] + [0.0, 0.0, LAMP_HEIGHT]
                 number = f"{one['tl']}_{one['linkIndex']}"
                 heading = math.atan2(y, x)
                 yield PlacedSignal(edge.id, number, "", "1000011", dynamic=True, position=position, yaw=heading)

@@ -10,7 +10,7 @@ from shapely.geometry.base import BaseGeometry
 
 from ...arrays import Float
 from ...geometry.geo_reference import TransverseMercator
-from .extract import Extract, Node, Relation, Way, rings
+from .extract import Extract, Node, Relation, Way
 
 MIN_FOOTPRINT = 0.5  # square metres: smaller outlines are ignored
 OUTER_ROLES, INNER_ROLES = {"outer", "outline", "part", ""}, {"inner"}
@@ -112,19 +112,17 @@ class PlanShapes:
         return area.difference(shapely.union_all([shapely.make_valid(ring) for ring in inner]))
 
     def _joined(self, relation: Relation, roles: set[str]) -> list[shapely.Polygon]:
-        ways = [
-            self.extract.ways[ref]
-            for kind, ref, role in relation.members
-            if kind == "way" and role in roles and ref in self.extract.ways
-        ]
-        found, left = rings(ways)
-        self.dropped[PIECES] += left
-        closed = []
-        for ring in found:
-            line = np.array([self._place(number) for number in ring if number in self.extract.nodes]).reshape(-1, 2)
-            if len(np.unique(line, axis=0)) >= 3:
-                closed.append(shapely.Polygon(line))
-        return closed
+        """Return the areas within the ways of a relation with given roles, joined end to end to rings."""
+        refs = [ref for kind, ref, role in relation.members if kind == "way" and role in roles]
+        ways = [self.extract.ways[ref] for ref in refs if ref in self.extract.ways]
+        lines = [shapely.LineString(line) for line in map(self.line, ways) if len(line) > 1]
+        found, *rest, crossed = shapely.polygonize_full(lines)
+        # The ends of what the extract cuts off are joined by a straight line; other open lines are left out.
+        left = shapely.get_parts(shapely.line_merge(shapely.union_all(rest)))
+        is_cut = any(number not in self.extract.nodes for way in ways for number in way.nodes)
+        closed = [shapely.Polygon(line) for line in left if is_cut and len(line.coords) > 2]
+        self.dropped[PIECES] += len(left) - len(closed)
+        return [*shapely.get_parts(found), *map(shapely.Polygon, shapely.get_parts(crossed)), *closed]
 
     def _place(self, number: int) -> tuple[float, float]:
         if number not in self._known:

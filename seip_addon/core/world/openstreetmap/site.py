@@ -1,10 +1,7 @@
 """Map of the streets in an extract of OpenStreetMap, and a description of the objects next to them."""
 
-import difflib
-import itertools
 import math
-from collections import defaultdict
-from collections.abc import Collection, Generator, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Generator, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -24,36 +21,30 @@ from ..opendrive.lanes import LaneSurface, lane_surfaces
 from ..opendrive.road_map import Junction, RoadMap
 from ..streetscape import road_surface
 from ..streetscape.description import DEFAULT_RADIUS, SiteDescription
-from ..streetscape.intersections import SAME_DIRECTION, TOUCH, intersection
+from ..streetscape.intersections import intersection
 from ..streetscape.levels import UNNAMED_ROAD
 from ..streetscape.named_places import street_names
 from ..streetscape.place import SCENE_MARGIN
 from ..streetscape.street_map import StreetMap
 from ..streetscape.terrain import FlatLand
-from .extract import EARTH_RADIUS, MAX_LATITUDE, Extract, Node, Way, cropped, read_extract, window
-from .heights import StreetHeights, has_heights, street_heights
+from .assumptions import MAX_NAMED, assumed_crossings, assumed_lanes, implausible_lane_notes, lane_notes, lone_signals
+from .extract import EARTH_RADIUS, MAX_LATITUDE, Extract, Way, cropped, read_extract, window
+from .heights import StreetHeights, street_heights
 from .mapped_crossings import guessed_crossings, with_mapped_crossings
 from .netconvert import convert
 from .network_map import NetworkMap, read_network_map
 from .plan_shapes import PlanShapes
-from .signals import SIGNAL_REACH
-from .street_lanes import has_lane_count, has_widths, implausible_lanes, lane_counts, shares_lane, usual_lanes
+from .street_lanes import has_widths
 from .street_objects import surroundings
-from .streets import CLASSES, SHORT_PIECE, StreetFile, is_street, is_tunnel, shown_name, write_streets
+from .street_titles import MAX_JUNCTION_DISTANCE, crossing_pair, headings_at, meeting_place, ranks, spelt
+from .streets import StreetFile, write_streets
 
 EXTRACT_SUFFIXES = (".osm", ".osm.gz", ".osm.xml", ".pbf")
 OTHER_SUFFIXES = (".json", ".geojson", ".osc", ".osc.gz", ".osm.bz2", ".osm.zip")
 """Suffixes of OpenStreetMap data in formats that `read_extract` refuses with the cure."""
 STREET_REACH = 450.0  # metres beyond the region within which streets are laid out: traffic comes from there
-MAX_JUNCTION_DISTANCE = 60.0  # metres from a requested place to its junction at most
-NAMES = ("name", "name:en", "alt_name", "ref")
-"""Tags that name a street."""
-RANKS = (*(kind for kind in CLASSES if not kind.endswith("_link")), "service", *CLASSES)
-"""Classes of streets, the highest first, and slip roads last."""
 MAX_ROUNDABOUT = 200.0  # metres across which a roundabout is one place at most
 MIN_RAMP = 0.05  # metres: notes list streets that a bridge or ramp moves by at least this much
-MAX_NAMED = 6  # street names in a note at most
-MAX_SHOWN = 12  # characters of a tag's value in a note at most
 STANDS_AROUND = 20.0  # metres beyond the scene within which objects are included
 
 
@@ -138,10 +129,7 @@ class ExtractSite:
         """Return the same site with its streets raised to the ground, onto bridges and into underpasses."""
         relief, road_map = self.description.relief, self.streets.road_map
         ground = None if relief is None else relief.rise
-        # An edge has the id of the way that it was made from, with a minus sign if it leads the opposite way.
-        sources = {road.id: road.id for road in road_map.roads}
-        lanes = road_surface.by_road(self.streets.lanes)
-        heights = street_heights(road_map, lanes, sources, self.source, self.shapes, ground)
+        heights = street_heights(road_map, self.source, self.shapes, ground)
         raised = replace(self, notes=(*self.notes, *heights.notes, *self._ramp_notes(heights)))
         is_raised = any(along_road.any() for _, along_road in heights.profiles.values())
         if is_raised:
@@ -150,7 +138,7 @@ class ExtractSite:
         if relief is not None:
             relief = replace(relief, bridges=heights.bridges)
             return replace(raised, description=replace(self.description, relief=relief))
-        if is_raised and not has_heights(road_map):
+        if is_raised and not self.source.elevated:
             land = FlatLand(0.0, heights.bridges)
             return replace(raised, description=replace(self.description, flat_land=land))
         return raised
@@ -209,13 +197,11 @@ def site_of_extract(
     streets = with_mapped_crossings(network.streets, source, shapes)
     extent = _extent(streets, source, extract, near, place)
     stands_there = surroundings(shapes, extent.surroundings, extent.carriageway)
-    tunnels = _tunnels(extract, shapes, extent.seen, place.level)
-    _check_level(place.level, tunnels, streets.road_map)
     near_streets = [way for way in source.ways.values() if extent.seen.intersects(_path(shapes, way))]
     junction = extent.junction
     description = replace(
         stands_there,
-        name=_name(extract, streets, source, place, extent, in_tunnel=bool(tunnels)),
+        name=_name(extract, streets, source, place, extent),
         near=None if place.radius is None else (float(extent.middle[0]), float(extent.middle[1])),
         junction=junction.id if place.radius is None and junction is not None else None,
         radius=place.radius,
@@ -231,14 +217,15 @@ def site_of_extract(
         *place_notes,
         *extract.notes,
         *source.notes,
-        *_assumed_lanes(near_streets),
-        *_lane_notes(near_streets, source.widened),
-        *_implausible_lanes(near_streets),
-        *_tunnel_notes(tunnels),
-        *_assumed_crossings(guessed_crossings(streets, extent.seen)),
+        *assumed_lanes(near_streets),
+        *lane_notes(near_streets, source.widened),
+        *implausible_lane_notes(near_streets),
+        *assumed_crossings(guessed_crossings(streets, extent.seen)),
         *(counted(number, *reason) for reason, number in shapes.dropped.items() if number),
-        *_lone_signals([node for node in lone if extent.seen.intersects(shapely.Point(shapes.point(node)))]),
+        *lone_signals([node for node in lone if extent.seen.intersects(shapely.Point(shapes.point(node)))]),
     )
+    sidewalks = shapely.MultiLineString([way.line for way in description.ways if way.line is not None])
+    network = network.walking_on(sidewalks)
     return ExtractSite(streets, network, network.text, description, notes, source, shapes, extent.seen)
 
 
@@ -250,7 +237,7 @@ def _extract_around(
     # centre may lie away from the place.
     most = place.reach + STREET_REACH + 200.0
     extract = yield from read_extract(path, None if place.near is None else window(*place.near, most))
-    near, notes = (place.near, ()) if place.near else _meeting_place(extract, place.streets)
+    near, notes = (place.near, ()) if place.near else meeting_place(extract, place.streets)
     return cropped(extract, window(*near, most)), near, notes
 
 
@@ -286,6 +273,8 @@ class _Extent:
         Nearest junction.
     away : float, metres
         Its distance.
+    together : frozenset of str
+        Ids of the junctions that form one intersection with it.
     roundabouts : tuple of frozenset of str
         Junction ids of each roundabout.
     seen : shapely geometry
@@ -300,6 +289,7 @@ class _Extent:
     middle: Float
     junction: Junction | None
     away: float
+    together: frozenset[str]
     roundabouts: tuple[frozenset[str], ...]
     seen: BaseGeometry
     surroundings: BaseGeometry
@@ -334,6 +324,7 @@ def _extent(
         middle,
         junction,
         away,
+        together,
         roundabouts,
         shapely.Point(middle).buffer(place.radius or size),
         shapely.Point(middle).buffer(reach + SCENE_MARGIN + STANDS_AROUND, quad_segs=16),
@@ -341,36 +332,14 @@ def _extent(
     )
 
 
-def _name(
-    extract: Extract,
-    streets: StreetMap,
-    source: StreetFile,
-    place: ExtractPlace,
-    extent: _Extent,
-    *,
-    in_tunnel: bool,
-) -> str:
+def _name(extract: Extract, streets: StreetMap, source: StreetFile, place: ExtractPlace, extent: _Extent) -> str:
     """Return the title of a place: the streets that were asked for, or those that meet there."""
-    names = [_spelt(extract, name) for name in place.streets]
-    if not names:
-        titled = replace(place, level=()) if in_tunnel else place
-        ranks = _ranks(source.ways.values())
-        names = _title(streets.road_map, streets.lanes, titled, extent.middle, extent.roundabouts, ranks)
+    names = [spelt(extract, name) for name in place.streets] or _title(streets, source, place, extent)
     if names:
         return STREETS.join(names)
     latitude, longitude = extent.near
     kind = "Junction" if extent.away <= (place.radius or math.inf) else "Street"
     return f"{kind} at {latitude:.5f}, {longitude:.5f}"
-
-
-def _lone_signals(nodes: Sequence[Node]) -> Iterator[str]:
-    """Yield a note on traffic signals that have no post."""
-    if nodes:
-        places = " and ".join(f"{node.latitude:.5f}, {node.longitude:.5f}" for node in nodes[:3])
-        yield (
-            f"traffic signals that belong to no junction within {SIGNAL_REACH:g} m have no post: {len(nodes)}, "
-            f"at {places}{' and elsewhere' if len(nodes) > 3 else ''}; describe a signal_pole where one stands"
-        )
 
 
 def _path(shapes: PlanShapes, way: Way) -> BaseGeometry:
@@ -383,94 +352,6 @@ def _assumed_widths(ways: Iterable[Way]) -> frozenset[str]:
     """Return the groups of lanes whose widths are assumed for some streets; those of pavements always are."""
     known = all(has_widths(way.tags) for way in ways if "highway" in way.tags)
     return frozenset({"sidewalk", "biking"}) if known else frozenset({"sidewalk", "biking", "driving"})
-
-
-def _names(ways: Iterable[Way]) -> str:
-    """Return the names of streets for a note, in alphabetical order."""
-    unnamed = "streets without a name"
-    names = {{**way.tags, **shown_name(way.tags)}.get("name", unnamed) for way in ways}
-    known = sorted(names, key=lambda name: (name == unnamed, name))
-    return ", ".join(known[:MAX_NAMED]) + (f" and {len(known) - MAX_NAMED} more" * (len(known) > MAX_NAMED))
-
-
-def _assumed_lanes(ways: Iterable[Way]) -> Iterator[str]:
-    """Yield notes on streets without a number of lanes in the extract."""
-    streets: dict[int, list[Way]] = {}
-    for way in ways:
-        if "highway" in way.tags and not has_lane_count(way.tags) and not implausible_lanes(way.tags):
-            streets.setdefault(usual_lanes(way.tags), []).append(way)
-    for lanes, found in sorted(streets.items()):
-        each = "one lane is" if lanes == 1 else f"{lanes} lanes are"
-        yield f"{each} assumed in each direction of streets without a number of lanes in the extract: {_names(found)}"
-
-
-def _lane_notes(ways: Sequence[Way], widened: Collection[Way]) -> Iterator[str]:
-    """Yield notes on pieces with the lanes of their neighbours, and on streets with one lane for both directions."""
-    pieces = [way for way in ways if way in widened]
-    shared = [way for way in ways if "highway" in way.tags and shares_lane(way.tags)]
-    if pieces:
-        yield (
-            f"pieces shorter than {SHORT_PIECE:g} m without a number of lanes have those of their neighbours: "
-            f"{_names(pieces)}"
-        )
-    if shared:
-        yield f"one lane serves both directions of {_names(shared)}, as the extract gives one lane in all"
-
-
-def _implausible_lanes(ways: Iterable[Way]) -> Iterator[str]:
-    """Yield a note on each street whose tags give an implausible number of lanes."""
-    notes = []
-    for way in ways:
-        given = implausible_lanes(way.tags) if "highway" in way.tags else {}
-        if given:
-            name = {**way.tags, **shown_name(way.tags)}.get("name") or UNNAMED_ROAD
-            values = ", ".join(
-                f"{key}={value[:MAX_SHOWN]}{'…' * (len(value) > MAX_SHOWN)}" for key, value in given.items()
-            )
-            lanes = sum(lane_counts(way.tags).values())
-            are = counted(lanes, "lane in all is", "lanes in all are")
-            notes.append(f"the extract gives {name} {values}, which is not a plausible number of lanes: {are} assumed")
-    yield from dict.fromkeys(notes)
-
-
-def _tunnels(extract: Extract, shapes: PlanShapes, seen: BaseGeometry, level: Sequence[str]) -> tuple[str, ...]:
-    """Return the names of streets of the level that lie in tunnels in an area, in the spelling of the extract."""
-    wanted = {name.strip().casefold() for name in level}
-    found = (
-        next(way.tags[key] for key in NAMES if way.tags.get(key, "").casefold() in wanted)
-        for way in extract.ways.values()
-        if is_tunnel(way.tags)
-        and wanted & {way.tags[key].casefold() for key in NAMES if key in way.tags}
-        and seen.intersects(_path(shapes, way))
-    )
-    return tuple(dict.fromkeys(found))
-
-
-def _check_level(level: Sequence[str], tunnels: Sequence[str], road_map: RoadMap) -> None:
-    """Raise an error if all streets of the level lie in tunnels."""
-    known = {text.casefold() for road in road_map.roads for text in (road.id, road.name)}
-    hidden = [name for name in tunnels if name.casefold() not in known]
-    if hidden and not any(name.strip().casefold() in known for name in level):
-        raise SeipError(
-            f"{hidden[0]} lies in a tunnel at this place, and scenes leave tunnels out: choose a street on the "
-            "surface with --level, or leave --level out"
-        )
-
-
-def _tunnel_notes(tunnels: Sequence[str]) -> Iterator[str]:
-    """Yield a note on streets of the level that lie in tunnels."""
-    for name in tunnels:
-        yield (
-            f"{name} lies in a tunnel at this place, and scenes leave tunnels out: the streets above are studied, "
-            f"and {name} only where it is in the open"
-        )
-
-
-def _assumed_crossings(number: int) -> Iterator[str]:
-    """Yield a note on crossings that are not mapped in the extract."""
-    if number:
-        are = counted(number, "crossing of pedestrians at junctions is", "crossings of pedestrians at junctions are")
-        yield f"{are} assumed: the extract maps none there"
 
 
 def _check(path: Path, place: ExtractPlace) -> None:
@@ -572,151 +453,33 @@ def _reach(lanes: Sequence[LaneSurface], junctions: Collection[str], middle: Flo
     return float(np.hypot(*np.concatenate([np.zeros((1, 2)), *corners]).T).max())
 
 
-def _title(
-    road_map: RoadMap,
-    lanes: Sequence[LaneSurface],
-    place: ExtractPlace,
-    middle: Float,
-    roundabouts: Sequence[frozenset[str]],
-    ranks: Mapping[str, int],
-) -> list[str]:
+def _title(streets: StreetMap, source: StreetFile, place: ExtractPlace, extent: _Extent) -> list[str]:
     """Return the names of up to two streets for the title of a place.
 
-    These are streets of the nearest junction. With a radius the junction must lie within it and, with a level, one of
-    the streets of the level must meet there. If there is no such junction, the streets of the level are used, or the
+    These are the streets of the nearest junction, if it lies within the radius; otherwise those of the level, or the
     nearest street.
     """
-    near = nearest_junctions(road_map, lanes, float(middle[0]), float(middle[1]), len(road_map.junctions))
+    road_map, lanes = streets.road_map, streets.lanes
+    radius = math.inf if place.radius is None else place.radius
     on_level = {name.strip().casefold() for name in place.level}
     level = list(dict.fromkeys(r.name for r in road_map.roads if on_level & {r.name.casefold(), r.id} and r.name))
-    for junction, away in near:
-        if place.radius is not None and away > place.radius:
-            break
-        together = intersection(lanes, junction.id, roundabouts)
-        meeting = _street_names(road_map, lanes, junction.id, together)
-        if place.radius is None or not level or set(level) & set(meeting):
-            return _crossing_pair(sorted(meeting, key=ranks.__getitem__), _headings(road_map, lanes, together))
+    junction = extent.junction
+    if junction is not None and extent.away <= radius:
+        meeting = streets_of_junctions(road_map, lanes)
+        numbers = sorted(extent.together, key=lambda number: (number != junction.id, number))
+        names = dict.fromkeys(name for number in numbers for name in meeting.get(number, ()))
+        if place.radius is None or not level or set(level) & set(names):
+            ranked = sorted(names, key=ranks(source.ways.values()).__getitem__)
+            return crossing_pair(ranked, headings_at(road_map, lanes, extent.together))
     if level:
         return level[:2]
-    names = {road.id: road.name for road in road_map.roads}
-    driving = [lane for lane in road_surface.in_groups(lanes, ["driving"]) if names[lane.road_id]]
-    here = shapely.Point(middle)
+    called = {road.id: road.name for road in road_map.roads}
+    driving = [lane for lane in road_surface.in_groups(lanes, ["driving"]) if called[lane.road_id]]
+    here = shapely.Point(extent.middle)
     nearest = min(driving, key=lambda lane: float(lane.polygon.distance(here)), default=None)
-    return [] if nearest is None or nearest.polygon.distance(here) > (place.radius or 0.0) else [names[nearest.road_id]]
-
-
-def _street_names(
-    road_map: RoadMap, lanes: Sequence[LaneSurface], junction_id: str, together: Collection[str]
-) -> tuple[str, ...]:
-    """Return the names of the streets at a group of junctions that form one, those of the central junction first."""
-    meeting = streets_of_junctions(road_map, lanes)
-    numbers = sorted(together, key=lambda number: (number != junction_id, number))
-    return tuple(dict.fromkeys(name for number in numbers for name in meeting.get(number, ())))
-
-
-def _ranks(ways: Iterable[Way]) -> defaultdict[str, int]:
-    """Return the rank of each street by name: the rank of its highest class, with slip roads last."""
-    ranks: defaultdict[str, int] = defaultdict(lambda: len(RANKS))
-    for way in ways:
-        name = {**way.tags, **shown_name(way.tags)}.get("name", "")
-        kind = way.tags.get("highway", "")
-        ranks[name] = min(ranks[name], RANKS.index(kind) if kind in RANKS else len(RANKS))
-    return ranks
-
-
-def _headings(
-    road_map: RoadMap, lanes: Sequence[LaneSurface], junctions: Collection[str]
-) -> defaultdict[str, list[float]]:
-    """Return the directions (radians) of each street at a group of junctions, by street name."""
-    area = shapely.union_all([lane.polygon for lane in lanes if lane.junction_id in junctions])
-    names = {road.id: road.name for road in road_map.roads}
-    headings: defaultdict[str, list[float]] = defaultdict(list)
-    for lane in lanes:
-        if lane.junction_id is None and area.distance(lane.polygon) < TOUCH:
-            x, y = (lane.left[-1] - lane.left[0])[:2].tolist()
-            headings[names[lane.road_id]].append(math.atan2(y, x))
-    return headings
-
-
-def _crossing_pair(names: Sequence[str], headings: Mapping[str, Sequence[float]]) -> list[str]:
-    """Return the first name, and the first other name whose street crosses that one instead of continuing it."""
-
-    def crosses(name: str) -> bool:
-        pairs = itertools.product(headings.get(names[0], ()), headings.get(name, ()))
-        # Directions are compared modulo 180 degrees: a street that continues the other under a new name is in line with
-        # it.
-        return any(abs(math.remainder(one - other, math.pi)) > SAME_DIRECTION for one, other in pairs)
-
-    # The sort is stable, so that names keep their rank among those that cross, and among those that do not.
-    others = sorted(names[1:], key=lambda name: not crosses(name))
-    return [*names[:1], *others[:1]]
-
-
-def _spelt(extract: Extract, name: str) -> str:
-    """Return the name of a street in the spelling of the extract, from any of its names."""
-    wanted = name.strip().casefold()
-    for way in _streets_called(extract, name):
-        shown = {**way.tags, **shown_name(way.tags)}
-        for key in NAMES:
-            if way.tags.get(key, "").casefold() == wanted:
-                return shown.get(key, "") or name
-    return name.strip()
-
-
-def _meeting_place(extract: Extract, names: tuple[str, ...]) -> tuple[tuple[float, float], tuple[str, ...]]:
-    """Return the latitude and longitude where streets meet, and a note if they meet in several places.
-
-    Nodes that the streets share are grouped by distance; the result is the mean of the largest group.
-    """
-    named = {name: _streets_called(extract, name) for name in names}
-    for name, ways in named.items():
-        if not ways:
-            raise SeipError(f"{extract.name} has no street called {name!r}; {_similar_names(extract, name)}")
-    nodes = [{number for way in ways for number in way.nodes} for ways in named.values()]
-    shared = sorted(set.intersection(*nodes) & extract.nodes.keys())
-    if not shared:
-        both = " and ".join(map(repr, names))
-        raise SeipError(f"{both} do not meet in {extract.name}: name streets that share a node")
-    groups: list[list[Node]] = []
-    for node in (extract.nodes[number] for number in shared):
-        # Single-linkage clustering: a node merges all groups that have a node near it. Dual carriageways that cross
-        # share up to four nodes, which are one place.
-        met = [group for group in groups if any(_distance(node, other) < MAX_JUNCTION_DISTANCE for other in group)]
-        groups = [*(group for group in groups if group not in met), [node, *itertools.chain(*met)]]
-    places = [
-        (sum(node.latitude for node in group) / len(group), sum(node.longitude for node in group) / len(group))
-        for group in sorted(groups, key=len, reverse=True)
-    ]
-    if len(places) == 1:
-        return places[0], ()
-    first, *others = [f"{latitude:.5f} {longitude:.5f}" for latitude, longitude in places[:4]]
-    note = (
-        f"{' and '.join(names)} meet in {len(places)} places; the one at {first} is used: for a different one give "
-        f"--near-latlon {' or '.join(others)}"
+    return (
+        [] if nearest is None or nearest.polygon.distance(here) > (place.radius or 0.0) else [called[nearest.road_id]]
     )
-    return places[0], (note,)
-
-
-def _distance(one: Node, other: Node) -> float:
-    """Return the distance between two nodes near each other, metres."""
-    north = math.radians(one.latitude - other.latitude)
-    east = math.radians(one.longitude - other.longitude) * math.cos(math.radians(one.latitude))
-    return EARTH_RADIUS * math.hypot(north, east)
-
-
-def _streets_called(extract: Extract, name: str) -> list[Way]:
-    wanted = name.strip().casefold()
-    return [
-        way
-        for way in extract.ways.values()
-        if is_street(way.tags, service=True) and wanted in {way.tags.get(key, "").casefold() for key in NAMES}
-    ]
-
-
-def _similar_names(extract: Extract, name: str) -> str:
-    known = sorted({way.tags["name"] for way in extract.ways.values() if "name" in way.tags and is_street(way.tags)})
-    close = difflib.get_close_matches(name, known, n=4, cutoff=0.4) or known[:5]
-    return f"the closest: {', '.join(close)}" if close else "its streets have no names"
 
 
 def _no_street(extract: Extract, near: tuple[float, float], reach: float) -> SeipError:

@@ -1,4 +1,7 @@
-"""Streets of an extract for SUMO's netconvert: selection of ways, with explicit lanes, widths and pavements."""
+"""Streets of an extract for SUMO's netconvert: selection of ways, with explicit lanes, widths and pavements.
+
+Its use is shown in `tests/core/world/openstreetmap/test_streets.py`.
+"""
 
 import itertools
 import math
@@ -12,6 +15,7 @@ import numpy as np
 import shapely
 
 from ...arrays import Float
+from ...geometry.tangent_plane import plan_metres
 from .bridges import Structures, structures
 from .extract import Extract, Node, Tags, Way, reversed_tags
 from .handedness import drives_on_the_left
@@ -110,11 +114,6 @@ def importance(tags: Tags) -> int:
     return 2 if highway in MAIN_CLASSES else int(highway == "tertiary")
 
 
-def is_tunnel(tags: Tags) -> bool:
-    """Return whether a way is a street in a tunnel; scenes leave tunnels out."""
-    return tags.get("highway") in CLASSES and _is_underground(tags)
-
-
 def _is_underground(tags: Tags) -> bool:
     return tags.get("tunnel", "no") not in ("no", "building_passage")
 
@@ -165,7 +164,7 @@ def write_streets(
         lines += _way(number, way.nodes, _tags(way, medians, left_hand=left_hand))
     lines += _restrictions(extract, {number for number, _ in pieces})
     path.write_text(os.linesep.join([*lines, "</osm>", ""]), encoding="utf-8")
-    roundabouts = _joined(way.nodes for _, way in pieces if is_roundabout(way.tags))
+    roundabouts = joined(way.nodes for _, way in pieces if is_roundabout(way.tags))
     slip_ends = tuple(_slip_ends(extract, [way for _, way in pieces]))
     crossed = structures(extract, pieces, places)
     return StreetFile(
@@ -201,38 +200,37 @@ def _with_lanes_of_neighbours(extract: Extract, *, service: bool) -> Extract:
         way = streets[number]
         return [other for other in at[end] if other != number and _continues(way, streets[other], end)]
 
-    ends = {
+    short = {
         number: [onward(number, end) for end in (way.nodes[0], way.nodes[-1])]
         for number, way in streets.items()
         if not has_lane_count(way.tags) and not implausible_lanes(way.tags) and _is_short(extract, way)
     }
+
+    def leads_on(side: Sequence[int]) -> bool:
+        return any(one in short or has_lane_count(streets[one].tags) for one in side)
+
     # A chain of short pieces counts if both of its ends lead on to pieces with lanes.
-    left: set[int] | None = None
-    while left is None or left:
-        left = {
-            number
-            for number, around in ends.items()
-            if not all(any(one in ends or has_lane_count(streets[one].tags) for one in side) for side in around)
-        }
-        ends = {number: around for number, around in ends.items() if number not in left}
-    while ends:
-        given = {
-            number: [
-                _lanes_along(streets[number], streets[other])
-                for other in itertools.chain(*around)
-                if has_lane_count(streets[other].tags)
-            ]
-            for number, around in ends.items()
-        }
-        # The wider neighbour: a lane too many is a taper, and one too few is a post in a lane.
-        for number, options in given.items():
-            if options:
-                widest = max(options, key=lambda tags: sum(lane_counts(tags).values()))
-                streets[number] = replace(streets[number], tags={**widest, **streets[number].tags})
-                del ends[number]
-        if not any(given.values()):
+    while loose := [number for number, around in short.items() if not all(map(leads_on, around))]:
+        short = {number: around for number, around in short.items() if number not in loose}
+    while short:
+        known = {number: _widest(streets, number, itertools.chain(*around)) for number, around in short.items()}
+        filled = {number: tags for number, tags in known.items() if tags is not None}
+        if not filled:
             break
+        for number, tags in filled.items():
+            streets[number] = replace(streets[number], tags={**tags, **streets[number].tags})
+            del short[number]
     return replace(extract, ways={**extract.ways, **streets})
+
+
+def _widest(streets: Mapping[int, Way], number: int, onward: Iterable[int]) -> Tags | None:
+    """Return the tags for lanes of the widest street that continues a way; None if none has a number of lanes.
+
+    A lane too many is a taper, and one too few is a post in a lane.
+    """
+    known = [streets[other] for other in onward if has_lane_count(streets[other].tags)]
+    options = (_lanes_along(streets[number], other) for other in known)
+    return max(options, key=lambda tags: sum(lane_counts(tags).values()), default=None)
 
 
 def _is_short(extract: Extract, way: Way) -> bool:
@@ -276,9 +274,7 @@ def _slip_ends(extract: Extract, ways: Sequence[Way]) -> Iterator[int]:
             neighbours.setdefault(other, set()).add(one)
     meeting = [number for number, others in neighbours.items() if len(others) > 2]
     places = _in_metres(extract, [extract.nodes[number] for number in meeting])
-    links = {
-        end for way in ways if _is_link(way.tags) and is_one_way(way.tags) for end in (way.nodes[0], way.nodes[-1])
-    }
+    links = {end for way in ways if is_link(way.tags) and is_one_way(way.tags) for end in (way.nodes[0], way.nodes[-1])}
     for number, place in zip(meeting, places, strict=True):
         # The smallest distance is that of the node to itself, 0; the second smallest is to the nearest other junction.
         if number in links and np.sort(np.hypot(*(places - place).T))[1:2].min(initial=math.inf) > JOIN_DISTANCE:
@@ -287,16 +283,12 @@ def _slip_ends(extract: Extract, ways: Sequence[Way]) -> Iterator[int]:
 
 def _in_metres(extract: Extract, nodes: Sequence[Node]) -> Float:
     """Return the positions of nodes (n, 2), metres east and north of the extract's first node."""
+    degrees = np.array([(node.latitude, node.longitude) for node in nodes], dtype=np.float64).reshape(-1, 2)
     first = next(iter(extract.nodes.values()))
-    # Equirectangular approximation with the length of a degree at the equator. It serves comparisons of distances,
-    # sides and crossings among neighbours only; netconvert projects the coordinates of the map itself.
-    east = 111_320.0 * math.cos(math.radians(first.latitude))
-    return np.array(
-        [((node.longitude - first.longitude) * east, (node.latitude - first.latitude) * 110_574.0) for node in nodes]
-    ).reshape(-1, 2)
+    return plan_metres(degrees, np.array([first.latitude, first.longitude]))
 
 
-def _joined(ways: Iterable[tuple[int, ...]]) -> tuple[frozenset[int], ...]:
+def joined(ways: Iterable[tuple[int, ...]]) -> tuple[frozenset[int], ...]:
     """Return the node sets of connected groups of ways; ways that share a node belong to one group."""
     found: list[frozenset[int]] = []
     for nodes in ways:
@@ -374,6 +366,12 @@ def _way(number: int, nodes: Iterable[int], tags: Mapping[str, str]) -> list[str
 
 def _tag_lines(tags: Mapping[str, str]) -> list[str]:
     return [f"<tag k={quoteattr(key)} v={quoteattr(value)}/>" for key, value in tags.items()]
+
+
+def way_id(name: str) -> int:
+    """Return the id of the way that an edge of netconvert, such as ``-12#3``, was made from; 0 if it has none."""
+    digits = "".join(itertools.takewhile(str.isdigit, name.removeprefix("-")))
+    return int(digits) if digits else 0
 
 
 def _restrictions(extract: Extract, streets: set[int]) -> Iterator[str]:
@@ -478,7 +476,7 @@ class _Medians:
         # Roundabouts and slip roads lie next to streets too, but are not the other carriageway of one.
         starts, stops, names = [], [], []
         for way in ways:
-            if is_one_way(way.tags) and way.tags.get("junction") is None and not _is_link(way.tags):
+            if is_one_way(way.tags) and way.tags.get("junction") is None and not is_link(way.tags):
                 line = self._line(way)
                 starts.append(line[:-1])
                 stops.append(line[1:])
@@ -517,5 +515,6 @@ class _Medians:
         return _in_metres(self._extract, self._extract.line(way))
 
 
-def _is_link(tags: Tags) -> bool:
+def is_link(tags: Tags) -> bool:
+    """Return whether a street is a slip road or a ramp."""
     return tags.get("highway", "").endswith("_link")

@@ -3,7 +3,6 @@
 import heapq
 import math
 import shlex
-from collections import deque
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -19,7 +18,7 @@ from .terrain import Terrain
 
 MAX_JOINT_STEP = 1.0  # metres of height within which roads that meet lead into each other
 MIN_LEVEL_HEIGHT = 2.0  # metres: a road more than this above another one crosses it on a different level
-MIN_LEAD = 10.0  # metres along the roads by which one of two roads equally many joints away is the nearer one
+MIN_LEAD = 10.0  # metres along the roads by which one of two roads that cross is the nearer one
 UNNAMED_ROAD = "a street without a name"
 MIN_OVERLAP = 1.0  # square metres in plan: roads that overlap less do not cross
 
@@ -98,10 +97,9 @@ def split_levels(
 ) -> Levels:
     """Divide lanes into those on the level of a place and those that cross above or below.
 
-    Of two crossing roads, the one that is fewer joints away from the anchors in the graph of roads is on the studied
-    level; if both are equally many joints away, the one that is nearer along the roads. Each remaining road takes the
-    level of the crossing road that is fewer joints away; ties are decided by height. A road that shares its surface
-    with a studied one is studied too, as where a street that leads to the other level branches off.
+    Of two crossing roads, the one that is nearer to the anchors along the roads is on the studied level. Each remaining
+    road takes the level of the crossing road that is nearer along the roads. A road that shares its surface with a
+    studied one is studied too, as where a street that leads to the other level branches off.
 
     Parameters
     ----------
@@ -135,13 +133,10 @@ def split_levels(
     # other one seeds the other levels, and the rest of the graph follows the nearer seed.
     joined = _joined(roads)
     start = (on_level or set(anchors)) & roads.keys()
-    others = _roads_farther_off(crossings, joined, roads, start)
+    others = _roads_farther_off(crossings, _away(joined, roads, start))
     winners = {road for crossing in crossings for road in (crossing.above, crossing.below)} | start
-    to_level, to_others = _hops(joined, winners - others), _hops(joined, others)
-    # A ramp half-way between both levels is equally near to both: its height decides.
-    even = {road for road in roads if to_others[road] == to_level[road] < math.inf}
+    to_level, to_others = _away(joined, roads, winners - others), _away(joined, roads, others)
     others |= {road for road in roads if to_others[road] < to_level[road]}
-    others |= {road for road in even - start if _lies_with_others(roads[road], roads, crossings, others)}
     # Roads that no joint connects with a crossing within this area take the level of the nearest road of their height.
     apart = {road for road in roads if to_others[road] == to_level[road] == math.inf}
     others |= {road for road in sorted(apart) if _next_to(road, roads, roads.keys() - apart) in others}
@@ -181,11 +176,6 @@ class _RoadArea:
     outline: BaseGeometry
     heights: tuple[float, float]
     terrain: Terrain
-
-    @property
-    def middle(self) -> float:
-        """Height half-way between the lowest and the highest point, metres."""
-        return sum(self.heights) / 2
 
 
 def _roads(lanes: Sequence[LaneSurface], around: BaseGeometry) -> dict[str, _RoadArea]:
@@ -253,30 +243,6 @@ def _points_in(part: BaseGeometry) -> Float:
     return np.concatenate([shapely.get_coordinates(part.representative_point()), shapely.get_coordinates(part)])
 
 
-def _hops(joined: Mapping[str, set[str]], start: Iterable[str]) -> dict[str, float]:
-    """Return the number of joints between each road and the nearest start; infinity if it cannot be reached."""
-    hops = dict.fromkeys(joined, math.inf)
-    # Breadth-first search; neighbours in sorted order keep the result independent of the order of sets.
-    waiting = deque(start)
-    hops.update(dict.fromkeys(waiting, 0.0))
-    while waiting:
-        road = waiting.popleft()
-        for following in sorted(joined[road]):
-            if hops[following] == math.inf:
-                hops[following] = hops[road] + 1
-                waiting.append(following)
-    return hops
-
-
-def _lies_with_others(
-    plan: _RoadArea, roads: Mapping[str, _RoadArea], crossings: Iterable[Crossing], others: set[str]
-) -> bool:
-    """Return whether a road lies nearer in height to the other road of the nearest crossing than to the studied one."""
-    crossing = min(crossings, key=lambda one: float(plan.outline.distance(shapely.Point(one.place))))
-    away = {road: abs(roads[road].middle - plan.middle) for road in (crossing.above, crossing.below)}
-    return min(away, key=lambda road: away[road]) in others
-
-
 def _on_studied_surface(roads: Mapping[str, _RoadArea], others: set[str], studied: Iterable[str]) -> set[str]:
     """Return the other roads that share the surface of a studied one, if neither climbs to a different level."""
     level = {road for road, own in roads.items() if own.heights[1] - own.heights[0] < MIN_LEVEL_HEIGHT}
@@ -310,31 +276,23 @@ def _next_to(road: str, roads: Mapping[str, _RoadArea], reached: Iterable[str]) 
     return ""
 
 
-def _roads_farther_off(
-    crossings: Iterable[Crossing], joined: Mapping[str, set[str]], roads: Mapping[str, _RoadArea], start: set[str]
-) -> set[str]:
-    """For each crossing, return the road with more joints between it and the place; if equal, the farther one.
+def _roads_farther_off(crossings: Iterable[Crossing], away: Mapping[str, float]) -> set[str]:
+    """Return the road of each crossing that is farther from the place, from the distances of roads in metres.
 
     Crossings without a joint to either road are skipped: their level follows from the roads next to them.
     """
-    hops = _hops(joined, start)
-    metres = _metres_away(joined, roads, start)
     losers = set()
     for crossing in crossings:
-        above, below = hops[crossing.above], hops[crossing.below]
+        above, below = away[crossing.above], away[crossing.below]
         if above == below == math.inf:
             continue
-        lead = metres[crossing.above] - metres[crossing.below] if above == below else above - below
-        if above == below and abs(lead) < MIN_LEAD:
+        if abs(above - below) < MIN_LEAD:
             raise _ambiguous(crossing)
-        # A positive lead is the distance by which the upper road is farther from the place than the lower one.
-        losers.add(crossing.above if lead > 0 else crossing.below)
+        losers.add(crossing.above if above > below else crossing.below)
     return losers
 
 
-def _metres_away(
-    joined: Mapping[str, set[str]], roads: Mapping[str, _RoadArea], start: Iterable[str]
-) -> dict[str, float]:
+def _away(joined: Mapping[str, set[str]], roads: Mapping[str, _RoadArea], start: Iterable[str]) -> dict[str, float]:
     """Return the distance of each road from the start along the roads between, metres; infinity without a path."""
     away = dict.fromkeys(joined, math.inf)
     waiting = [(0.0, road) for road in sorted(start)]

@@ -7,7 +7,7 @@ from enum import Enum
 import numpy as np
 
 from ...arrays import Float
-from ..opendrive.objects import PlacedObject
+from ..opendrive.objects import TUNNEL, PlacedObject
 
 
 class Kind(Enum):
@@ -24,7 +24,7 @@ class Kind(Enum):
     OTHER = "other"
 
 
-FLAT_KINDS = {"crosswalk", "parkingspace", "roadmark", "roadsurface", "patch"}
+FLAT_KINDS = {TUNNEL, "crosswalk", "parkingspace", "roadmark", "roadsurface", "patch"}
 KIND_OF_TYPE = {
     "tree": Kind.TREE,
     "vegetation": Kind.PLANTS,

@@ -10,15 +10,15 @@ from shapely.geometry.base import BaseGeometry
 
 from ...arrays import Float
 from ...errors import SeipError
-from ...geometry.plan import closed, united
+from ...geometry.plan import closed, opened, united
+from ...limits import SITE_RADIUS
 from ...site.scene_geometry import DEFAULT_WEIGHT
 from ..opendrive.junctions import find_junction, junction_area, nearest_junctions
 from ..opendrive.lanes import LaneSurface
 from ..opendrive.road_map import Junction, RoadMap
 from . import road_surface
 from .approaches import approach_lanes
-from .description import DEFAULT_RADIUS, MAX_RADIUS, SiteDescription
-from .geographic_position import looks_like_degrees
+from .description import DEFAULT_RADIUS, SiteDescription
 from .intersections import (
     JUNCTION_REACH,
     box_along,
@@ -30,7 +30,7 @@ from .intersections import (
 from .levels import Levels, split_levels
 from .named_places import street_names
 from .street_areas import GAP as JUNCTION_GAP
-from .street_areas import MIN_ISLAND_AREA, TOLERANCE, tapers
+from .street_areas import MIN_ISLAND_AREA, SPIKE, TOLERANCE, tapers
 from .street_map import JunctionArea
 
 MIN_SHARE_OF_JUNCTION = 0.5  # share of a junction's area in a region from which on the region includes all of it
@@ -99,7 +99,7 @@ class Place:
         """
         for lane in lanes:
             away = float(np.hypot(*(lane.left[0, :2] - lanes[0].left[0, :2])))
-            if away > 2 * MAX_RADIUS:
+            if away > 2 * SITE_RADIUS.most:
                 raise SeipError(
                     f"road {lane.road_id} lies {away:,.0f} m from road {lanes[0].road_id} of the same junction: "
                     "correct its <planView> in the map"
@@ -157,7 +157,7 @@ class Place:
         # Mitred corners of the closing that lie outside the road are no part of it.
         road = united([*(lane.polygon for lane in nearby), *junctions, *widened]).buffer(JUNCTION_GAP / 2)
         whole = closed(whole.simplify(TOLERANCE), JUNCTION_GAP).intersection(road)
-        return road_surface.without_crumbs(whole, least=MIN_ISLAND_AREA)
+        return road_surface.without_crumbs(opened(whole, SPIKE), least=MIN_ISLAND_AREA)
 
     def weighted_areas(self) -> list[tuple[str, BaseGeometry, float]]:
         """Return name, area and weight of the weighted regions.
@@ -241,8 +241,11 @@ class Place:
             where = f"in junction {description.junction!r}"
         elif description.region is not None:
             where = "within the region"
-        given = description.near is not None and not (x.is_integer() and y.is_integer())
-        hint = " (give metres of the map, not latitude and longitude)" if given and looks_like_degrees((x, y)) else ""
+        # Both numbers can be latitude and longitude, in either order.
+        as_degrees = (
+            max(abs(x), abs(y)) <= 180.0 and min(abs(x), abs(y)) <= 90.0 and not (x.is_integer() and y.is_integer())
+        )
+        hint = " (latitude and longitude are given by --near-latlon)" if description.near and as_degrees else ""
         return SeipError(f"there is no driving lane {where}{hint}{self._nearest()}")
 
     def _nearest(self) -> str:

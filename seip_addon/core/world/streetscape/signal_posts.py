@@ -10,8 +10,7 @@ import shapely
 from ...arrays import Float
 from ...site.roles import Role
 from ...site.scene_geometry import ASSUMED, FROM_MAP
-from ..opendrive.objects import PlacedObject
-from ..opendrive.signals import PlacedSignal
+from ..opendrive.objects import PlacedObject, PlacedSignal
 from . import street_furniture
 from .map_furniture import arm_heading, can_carry
 from .object_kinds import SIGNAL_WORDS, WORDS_OF_KIND, Kind, Post, post_of, words_of

@@ -14,7 +14,7 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from ...arrays import Float
-from ...geometry.plan import closed, united, without
+from ...geometry.plan import closed, opened, united, without
 from ..opendrive.lanes import LaneSurface
 from ..opendrive.road_map import Road
 from .road_surface import (
@@ -41,6 +41,7 @@ GAP = 0.5  # metres: gaps up to twice this between lanes and junctions are close
 AROUND_JUNCTION = 3.0  # metres from a junction within which such gaps lie
 MIN_ISLAND_AREA = 15.0  # m²: smaller holes of the carriageway are not islands
 SMALL_NOTCH = 1.25  # metres: notches of a pavement up to twice this are closed
+SPIKE = 0.1  # metres: narrower parts of outlines are left out
 MIN_PAVEMENT_WIDTH = 0.6  # metres: narrower parts of pavements are left out
 PAVEMENT_WIDTH = 2.5  # metres of pavement along the carriageway of a junction
 RATE = 10.0  # metres along the road for each metre that it widens where a lane is added
@@ -130,10 +131,11 @@ def street_areas(
     lines = without(lines, carriageway.buffer(GAP))
     mapped = united(one.area for one in sidewalks if one.area.dwithin(carriageway, MAX_MAPPED))
     # What lies between carriageways or on an island of the street is no pavement unless it is mapped as one.
-    assumed = _wide(without(_filled(walked, carriageway), united([_towards(side, lines), _medians(side)])))
+    assumed = without(_filled(walked, carriageway), united([_towards(side, lines), medians(side)]))
+    assumed = opened(assumed, MIN_PAVEMENT_WIDTH)
     assumed = without_crumbs(assumed, least=MIN_ASSUMED) if len(sidewalks) else assumed
     pavement = without(united([assumed, _at_kerb(mapped, carriageway)]), carriageway)
-    pavement = without(pavement, built_up)
+    pavement = opened(without(pavement, built_up), SPIKE)
     return StreetAreas(dict(_groups(strips, carriageway, inside)), without_crumbs(pavement), side, inside)
 
 
@@ -150,7 +152,7 @@ def _carriageway(strips: Sequence[BaseGeometry], junctions: Sequence[JunctionAre
     return without_crumbs(united([whole, *islands]).simplify(TOLERANCE), least=MIN_ROAD_AREA)
 
 
-def _medians(side: Roadside) -> BaseGeometry:
+def medians(side: Roadside) -> BaseGeometry:
     """Return the islands and medians of a carriageway; small gaps are corners."""
     between = shapely.get_parts(without(side.filled, side.carriageway))
     return united(part for part in between if part.area >= MIN_ISLAND_AREA)
@@ -186,13 +188,6 @@ def _filled(pavement: BaseGeometry, carriageway: BaseGeometry) -> BaseGeometry:
     """Return pavements outside the carriageway with small notches closed."""
     notches = without(closed(united([pavement, carriageway]), SMALL_NOTCH, "round"), carriageway)
     return without(united([pavement, notches.intersection(pavement.buffer(SMALL_NOTCH))]), carriageway)
-
-
-def _wide(pavement: BaseGeometry) -> BaseGeometry:
-    """Return pavements without parts that are too narrow to walk on."""
-    # Morphological opening: what vanishes when the area shrinks and grows again is narrower than the width.
-    wide = pavement.buffer(-MIN_PAVEMENT_WIDTH / 2, join_style="mitre")
-    return wide.buffer(MIN_PAVEMENT_WIDTH / 2, join_style="mitre")
 
 
 def _at_kerb(mapped: BaseGeometry, carriageway: BaseGeometry) -> BaseGeometry:

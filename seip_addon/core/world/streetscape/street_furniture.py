@@ -3,14 +3,45 @@
 Every solid has its foot at the origin and z up; arms reach along +x. Sizes are in metres.
 """
 
+from collections import Counter
+
 import numpy as np
+import shapely
 
 from ...arrays import Float
 from ...geometry.solids import Solid, join, prism, signed_area, tube
+from .terrain import triangulate
 
 STOREY_HEIGHT = 3.2
 WINDOW_SPACING = 3.4
 WINDOW_OFFSET = 0.03  # metres between panes and wall, so that panes are drawn in front of it
+_GRID = 1e-6  # metres that corners of outlines snap to
+
+
+def house(outline: shapely.Polygon, base: float, top: float, *, side: str) -> Solid:
+    """Return a building with a flat roof as a closed solid.
+
+    Parameters
+    ----------
+    outline : Polygon
+        Outline in plan, local axes; courtyards are its holes.
+    base, top : float, metres
+        Height of the floor and of the roof.
+    side : str
+        Material of the walls.
+    """
+    outline = shapely.set_precision(shapely.remove_repeated_points(outline), _GRID)
+    corners, index = np.unique(triangulate(outline, least=0.0).reshape(-1, 2), axis=0, return_inverse=True)
+    caps = [tuple(face) for face in index.reshape(-1, 3).tolist()]
+    count = len(corners)
+    # Edges between two triangles occur once in each direction. Those without the opposite one are the outline and its
+    # courtyards, where walls stand; all triangles are counter-clockwise, so that walls face outwards.
+    edges = Counter(edge for face in caps for edge in zip(face, (*face[1:], face[0]), strict=True))
+    walls = [(count + a, count + b, b, a) for a, b in edges if (b, a) not in edges]
+    floors = [tuple(count + corner for corner in reversed(face)) for face in caps]
+    materials = (*([side] * len(walls)), *(["roof"] * len(caps)), *([side] * len(floors)))
+    vertices = np.concatenate([np.column_stack([corners, np.full(count, height)]) for height in (top, base)])
+    return Solid(vertices, (*walls, *caps, *floors), materials)
 
 
 def windows(outline: Float, base: float, height: float) -> Solid:

@@ -9,10 +9,9 @@ from shapely.geometry.base import BaseGeometry
 from ...arrays import Float
 from ...progress import Progress
 from ..opendrive.lanes import LaneSurface, lane_surfaces
-from ..opendrive.objects import PlacedObject, placed_objects
+from ..opendrive.objects import PlacedObject, PlacedSignal
 from ..opendrive.profile import Profile
 from ..opendrive.road_map import RoadMap
-from ..opendrive.signals import PlacedSignal, placed_signals
 from .road_surface import with_rows_at
 
 ROADS_PER_STEP = 20
@@ -90,14 +89,14 @@ def opendrive_streets(road_map: RoadMap) -> Generator[Progress, None, StreetMap]
     Raises
     ------
     SeipError
-        A road, object or signal of the map is invalid.
+        A road of the map is invalid.
     """
     lanes: list[LaneSurface] = []
     for number, road in enumerate(road_map.roads):
         if number % ROADS_PER_STEP == 0:
             yield Progress(number, len(road_map.roads), "roads")
         lanes += lane_surfaces(road)
-    return StreetMap(road_map, tuple(lanes), placed_objects(road_map), placed_signals(road_map))
+    return StreetMap(road_map, tuple(lanes), road_map.objects, road_map.signals)
 
 
 def _linear(along: Float, heights: Float) -> Profile:

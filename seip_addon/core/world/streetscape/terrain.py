@@ -1,4 +1,7 @@
-"""Heights of the ground from triangles, areas draped over them, and embankments next to roads."""
+"""Heights of the ground from triangles, areas draped over them, and embankments next to roads.
+
+Its use is shown in `tests/core/world/streetscape/test_terrain.py`.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass

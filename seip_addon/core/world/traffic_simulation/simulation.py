@@ -229,15 +229,12 @@ def _complete_junctions(whole: StreetNetwork, cut: StreetNetwork) -> set[str]:
 def _crosswalks(road_map: RoadMap) -> list[Float]:
     """Return the corners (4, 2) of the crosswalks of a map, in plan, with the pavements at their ends."""
     outlines = []
-    for road in road_map.roads:
-        for item in road.objects:
-            if item.kind == "crosswalk" and item.length > 0.0 and item.width > 0.0:
-                s, t = np.array([item.s]), np.array([item.t])
-                heading = float(road.frame(s).heading[0]) + item.heading
-                ahead = np.array([np.cos(heading), np.sin(heading)]) * item.length / 2.0
-                aside = np.array([-np.sin(heading), np.cos(heading)]) * (item.width / 2.0 + _PAVEMENT_REACH)
-                signs = np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)])
-                outlines.append(road.place(s, t)[0, :2] + signs @ np.stack([ahead, aside]))
+    for one in road_map.objects:
+        if one.kind == "crosswalk" and one.length > 0.0 and one.width > 0.0:
+            ahead = np.array([np.cos(one.yaw), np.sin(one.yaw)]) * one.length / 2.0
+            aside = np.array([-np.sin(one.yaw), np.cos(one.yaw)]) * (one.width / 2.0 + _PAVEMENT_REACH)
+            signs = np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)])
+            outlines.append(one.position[:2] + signs @ np.stack([ahead, aside]))
     return outlines
 
 

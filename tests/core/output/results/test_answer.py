@@ -79,6 +79,17 @@ def test_the_possible_improvement_is_that_of_the_bound(record):
     assert status_text(moved).endswith("moved by hand")
 
 
+@pytest.mark.parametrize(("least", "word"), [(0.95, "good"), (0.9, "fair"), (0.5, "poor")])
+def test_an_answer_of_returns_begins_with_a_verdict(record, least, word):
+    one = with_returns(record)
+    judged = replace(one, returns=replace(one.returns, enough={"car": 0.991, "cyclist": least, "pedestrian": 0.96}))
+    expected = (
+        "A car in plain view returns 12 points or more at 99% of its places, "
+        f"a cyclist 8 or more at {least:.0%}, a pedestrian 8 or more at 96%: {word}. 150 returns from a road user"
+    )
+    assert answer(judged)[0].startswith(expected)
+
+
 @pytest.mark.parametrize(
     ("change", "named"),
     [

@@ -12,6 +12,7 @@ from seip_addon.core.errors import SeipError
 from seip_addon.core.geometry.geo_reference import projection
 from seip_addon.core.progress import finish
 from seip_addon.core.world.opendrive.read import read_map
+from seip_addon.core.world.openstreetmap.site import place_on_map
 from seip_addon.core.world.streetscape.description import SiteDescription
 from tests.builders.map_models import site_model
 from tests.builders.opendrive_text import document, geometry, lane, read_text, road, section
@@ -54,17 +55,13 @@ def built(road_map, near):
     return finish(site_model(road_map, SiteDescription(near=near, radius=30.0)))
 
 
-@pytest.mark.parametrize("turned", [False, True])
 @pytest.mark.parametrize("offset", [(0.0, 0.0), (4000.0, -3000.0)])
-def test_latitude_and_longitude_are_converted_by_the_maps_projection(tmp_path, turned, offset):
-    """Also in the other order; the numbers would be a place of the map in metres too, 56 m off its street."""
+def test_latitude_and_longitude_are_converted_by_the_maps_projection(tmp_path, offset):
     header = f'<offset x="{offset[0]}" y="{offset[1]}" z="0" hdg="0"/>'
     road_map = street(tmp_path, BERLIN, x=-offset[0], y=-offset[1], offset=header)
-    pair = (52.5, 13.402)
-    model = built(road_map, pair[::-1] if turned else pair)
+    model = built(road_map, place_on_map(road_map, (52.5, 13.402)))
     east = math.radians(0.002) * radii(math.radians(52.5))[1] * math.cos(math.radians(52.5))
     np.testing.assert_allclose(model.origin[:2], [east - offset[0], -offset[1]], atol=1.0)
-    assert "taken as latitude and longitude" in model.notes[0]
 
 
 CITY = b'{"type": "CityJSON", "version": "1.1", "CityObjects": {}}'

@@ -9,9 +9,7 @@ import numpy as np
 import pytest
 import shapely
 
-from seip_addon.core.world.opendrive.objects import placed_objects
 from seip_addon.core.world.opendrive.read import read_map
-from seip_addon.core.world.opendrive.signals import placed_signals
 from tests.builders.opendrive_text import map_lanes
 from tests.few import few
 
@@ -41,10 +39,10 @@ def test_a_real_map_has_sound_surfaces_objects_and_signals(name):
         normals = np.cross(*np.diff(surface.triangles, axis=1).swapaxes(0, 1))
         assert (normals[:, 2] >= 0).all()
         assert surface.polygon.is_valid
-    for placed in placed_objects(road_map):
+    for placed in road_map.objects:
         assert np.isfinite(placed.position).all()
         assert all(len(outline.base) == len(outline.height) >= 2 for outline in placed.outlines)
-    assert all(np.isfinite(signal.position).all() for signal in placed_signals(road_map))
+    assert all(np.isfinite(signal.position).all() for signal in road_map.signals)
 
 
 def areas(named_polygons):

@@ -6,16 +6,14 @@ import numpy as np
 import pytest
 import shapely
 
-from seip_addon.core.errors import SeipError
-from seip_addon.core.world.opendrive.objects import extent_in_plan, placed_objects
-from seip_addon.core.world.opendrive.signals import placed_signals
+from seip_addon.core.world.opendrive.objects import extent_in_plan
 from tests.builders.opendrive_text import document, geometry, read_text, road
 
 UPHILL = '<elevation s="0" a="5" b="0.1" c="0" d="0"/>'
 
 
 def objects(folder, inner, **options):
-    return placed_objects(read_text(folder, document(road(objects=inner, **options))))
+    return read_text(folder, document(road(objects=inner, **options))).objects
 
 
 def test_a_box_stands_upright_beside_a_sloping_road(tmp_path):
@@ -97,7 +95,7 @@ def test_signals_have_a_place_and_a_direction(tmp_path):
         '<signal id="2" type="274" dynamic="no" s="30" t="2" zOffset="4" orientation="-"/>'
     )
     road_map = read_text(tmp_path, document(road(geometry(hdg=0.5), signals=texts, elevation=UPHILL)))
-    post, lamp = placed_signals(road_map)
+    post, lamp = road_map.signals
     assert (post.id, post.name, post.kind, post.dynamic) == ("1", "Post", "1000001", True)
     ahead, left = np.array([math.cos(0.5), math.sin(0.5)]), np.array([-math.sin(0.5), math.cos(0.5)])
     np.testing.assert_allclose(post.position, [*(30 * ahead - 6 * left), 7.5])
@@ -107,7 +105,8 @@ def test_signals_have_a_place_and_a_direction(tmp_path):
     assert not lamp.dynamic
 
 
-def test_a_signal_on_a_road_that_is_not_there_is_named(tmp_path):
-    text = '<signal id="5" s="50" t="0"><positionRoad roadId="33" s="0" t="0"/></signal>'
-    with pytest.raises(SeipError, match="road 1: signal 5 is on road 33"):
-        placed_signals(read_text(tmp_path, document(road(signals=text))))
+def test_a_tunnel_is_a_line_along_its_road(tmp_path):
+    (tunnel,) = objects(tmp_path, '<tunnel id="9" name="Hill" s="20" length="30" type="standard"/>')
+    assert (tunnel.kind, tunnel.name, tunnel.length) == ("tunnel", "Hill", 30.0)
+    base = tunnel.outlines[0].base
+    assert np.hypot(*np.diff(base[[0, -1], :2], axis=0)[0]) == pytest.approx(30.0)

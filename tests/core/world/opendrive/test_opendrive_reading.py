@@ -9,9 +9,7 @@ from hypothesis import strategies as st
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.world.opendrive.junctions import find_junction
-from seip_addon.core.world.opendrive.objects import placed_objects
 from seip_addon.core.world.opendrive.read import read_map
-from seip_addon.core.world.opendrive.signals import placed_signals
 from tests.builders.opendrive_text import document, geometry, lane, map_lanes, read_text, road, section
 from tests.oracles.random_cases import cases
 
@@ -126,6 +124,17 @@ def test_a_junction_is_found_by_its_id_or_its_name(three_junctions):
     assert find_junction(*three_junctions, "North gate").id == "700"
 
 
+@pytest.mark.parametrize(
+    ("kind", "said"), [("direct", r"is a direct one.*--near 100 0"), ("default", "has no lanes; ")]
+)
+def test_of_a_junction_without_lanes_the_place_is_named(tmp_path, kind, said):
+    into = '<link><successor elementType="junction" elementId="5"/></link><planView>'
+    text = document(road().replace("<planView>", into), rest=f'<junction id="5" type="{kind}"/>')
+    road_map = read_text(tmp_path, text)
+    with pytest.raises(SeipError, match=said):
+        find_junction(road_map, map_lanes(road_map), "5")
+
+
 EVERYTHING = document(
     road(
         geometry('<poly3 a="0.1" b="0.1" c="0.001" d="-0.0001"/>', 30.0)
@@ -165,7 +174,7 @@ def is_read_or_refused_in_words(folder, span, value):
     try:
         road_map = read_text(folder, text, "mutant.xodr")
         surfaces = map_lanes(road_map)
-        objects = (*placed_objects(road_map), *placed_signals(road_map))
+        objects = (*road_map.objects, *road_map.signals)
     except SeipError:
         return
     assert all(np.isfinite(surface.triangles).all() for surface in surfaces)

@@ -15,10 +15,9 @@ from defusedxml.ElementTree import parse
 from seip_addon.core.sumo_programs import find_sumo
 from seip_addon.core.world.opendrive.junctions import junction_area
 from seip_addon.core.world.opendrive.lanes import LaneSurface
-from seip_addon.core.world.opendrive.objects import PlacedObject, placed_objects
+from seip_addon.core.world.opendrive.objects import PlacedObject
 from seip_addon.core.world.opendrive.read import read_map
 from seip_addon.core.world.opendrive.road_map import RoadMap
-from seip_addon.core.world.opendrive.signals import placed_signals
 from tests.builders.opendrive_text import map_lanes
 from tests.sumo_here import needs_sumo
 
@@ -73,7 +72,7 @@ def corridor() -> Shipped:
 def load(name: str) -> Shipped:
     path = SCENES / name
     road_map = read_map(path)
-    return Shipped(path, parse(path).getroot(), road_map, map_lanes(road_map), placed_objects(road_map))
+    return Shipped(path, parse(path).getroot(), road_map, map_lanes(road_map), road_map.objects)
 
 
 # --- Both maps ---------------------------------------------------------------------------------------------------
@@ -148,7 +147,7 @@ def test_carriageway_is_one_piece_without_holes(shipped: Shipped) -> None:
 
 def test_every_approach_has_its_traffic_light_stop_line_and_crosswalk(shipped: Shipped) -> None:
     carriageway, pavement = shipped.union("driving", "parking"), shipped.union("sidewalk")
-    signals = placed_signals(shipped.road_map)
+    signals = shipped.road_map.signals
     approaches = sum(neighbour.get("elementType") == "junction" for neighbour in shipped.root.iterfind("road/link/*"))
     for kind in ("roadmark", "crosswalk"):
         painted = shipped.outlines(kind)
@@ -201,7 +200,7 @@ def test_sumo_imports_the_map(shipped: Shipped, tmp_path: Path) -> None:
 
 def test_every_traffic_light_has_its_post(shipped: Shipped) -> None:
     posts = np.array([placed.position[:2] for placed in shipped.objects if placed.kind == "pole"])
-    lights = np.array([signal.position[:2] for signal in placed_signals(shipped.road_map) if signal.dynamic])
+    lights = np.array([signal.position[:2] for signal in shipped.road_map.signals if signal.dynamic])
     assert len(posts) == len(lights)
     for light in lights:
         assert np.hypot(*(posts - light).T).min() < 1e-6

@@ -7,7 +7,7 @@ import pytest
 from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import finish
 from seip_addon.core.world.openstreetmap import extract as reading
-from seip_addon.core.world.openstreetmap.extract import Way, read_extract, rings, window
+from seip_addon.core.world.openstreetmap.extract import read_extract, window
 from tests.builders.osm_text import crossing
 
 
@@ -134,13 +134,6 @@ def test_an_extract_that_is_too_large_is_refused(tmp_path, monkeypatch):
     monkeypatch.setattr(reading, "MAX_ELEMENTS", 10)
     with pytest.raises(SeipError, match="more than 10 elements; cut the place out"):
         read(crossing().write(tmp_path / "place.osm"))
-
-
-def test_ways_are_joined_to_rings_in_either_direction():
-    ways = [Way((1, 2, 3), {}), Way((5, 4, 3), {}), Way((5, 1), {}), Way((7, 8), {})]
-    found, left = rings(ways)
-    assert found == [[1, 2, 3, 4, 5]]
-    assert left == 1
 
 
 def test_places_on_both_sides_of_the_date_line_are_neighbours(tmp_path):

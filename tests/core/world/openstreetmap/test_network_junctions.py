@@ -7,8 +7,8 @@ import shapely
 from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import finish
 from seip_addon.core.workflows.network_sites import extract_xml
+from seip_addon.core.world.openstreetmap.crossings import SAME_JUNCTION, metres, selected_junctions
 from seip_addon.core.world.openstreetmap.extract import cropped, read_extract, window
-from seip_addon.core.world.openstreetmap.network_junctions import SAME_JUNCTION, metres, selected_junctions
 from tests.builders.osm_text import Extract
 
 

@@ -6,24 +6,25 @@ import shapely
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.world.openstreetmap.network_map import credited, read_network_map
+from seip_addon.core.world.traffic_simulation.street_network import read_network
 
 NETWORK = """<net version="1.20"{left}>
 <location netOffset="-391000.00,-5817000.00" convBoundary="0,0,1,1" origBoundary="0,0,1,1" projParameter="+proj=utm"/>
 <edge id=":b_0" function="internal">
-  <lane id=":b_0_0" index="0" allow="pedestrian" width="2.50" shape="98.00,-4.45 102.00,-4.45"/></edge>
+  <lane id=":b_0_0" index="0" length="98" allow="pedestrian" width="2.50" shape="98.00,-4.45 102.00,-4.45"/></edge>
 <edge id=":b_1" function="internal">
-  <lane id=":b_1_0" index="0" disallow="pedestrian" width="3.20" shape="98.00,-1.60 102.00,-1.60"/></edge>
+  <lane id=":b_1_0" index="0" length="98" disallow="pedestrian" width="3.20" shape="98.00,-1.60 102.00,-1.60"/></edge>
 <edge id=":b_c0" function="crossing" crossingEdges="2">
-  <lane id=":b_c0_0" index="0" allow="pedestrian" width="4.00" shape="100.00,-5.00 100.00,1.00"/></edge>
+  <lane id=":b_c0_0" index="0" length="98" allow="pedestrian" width="4.00" shape="100.00,-5.00 100.00,1.00"/></edge>
 <edge id=":b_w0" function="walkingarea">
-  <lane id=":b_w0_0" index="0" allow="pedestrian" width="2.5" shape="98,-3.2 98,-5.7 102,-5.7 102,-3.2"/>
+  <lane id=":b_w0_0" index="0" length="98" allow="pedestrian" width="2.5" shape="98,-3.2 98,-5.7 102,-5.7 102,-3.2"/>
 </edge>
 <edge id="2" from="a" to="b" name="Mill &amp;amp; Lane">
-  <lane id="2_0" index="0" allow="pedestrian" width="2.50" shape="0.00,-4.45 98.00,-4.45"/>
-  <lane id="2_1" index="1" disallow="pedestrian" width="3.20" shape="0.00,-1.60 98.00,-1.60"/></edge>
+  <lane id="2_0" index="0" length="98" allow="pedestrian" width="2.50" shape="0.00,-4.45 98.00,-4.45"/>
+  <lane id="2_1" index="1" length="98" disallow="pedestrian" width="3.20" shape="0.00,-1.60 98.00,-1.60"/></edge>
 <edge id="3" from="b" to="c" name="Mill &amp;amp; Lane">
-  <lane id="3_0" index="0" allow="pedestrian" width="2.50" shape="102.00,-4.45 200.00,-4.45"/>
-  <lane id="3_1" index="1" disallow="pedestrian" width="3.20" shape="102.00,-1.60 200.00,-1.60"/></edge>
+  <lane id="3_0" index="0" length="98" allow="pedestrian" width="2.50" shape="102.00,-4.45 200.00,-4.45"/>
+  <lane id="3_1" index="1" length="98" disallow="pedestrian" width="3.20" shape="102.00,-1.60 200.00,-1.60"/></edge>
 {more}
 <junction id="a" type="dead_end" x="0" y="0" shape="0.00,0.00 0.00,-5.70"/>
 <junction id="b" type="priority" x="100" y="0" shape="98.00,0.00 102.00,0.00 102.00,-5.70 98.00,-5.70"/>
@@ -31,7 +32,9 @@ NETWORK = """<net version="1.20"{left}>
 <connection from="2" to="3" fromLane="1" toLane="1" via=":b_1_0" tl="b" linkIndex="0" dir="s" state="O"/>
 </net>
 """
-SIDE_STREET = '<edge id="4" from="d" to="b"><lane id="4_0" index="0" disallow="tram" shape="100,90 100,4"/></edge>'
+SIDE_STREET = (
+    '<edge id="4" from="d" to="b"><lane id="4_0" index="0" length="98" disallow="tram" shape="100,90 100,4"/></edge>'
+)
 
 
 def read(tmp_path, *, left="", more=""):
@@ -89,7 +92,9 @@ def test_crossings_and_signals_are_placed(tmp_path):
 
 
 def test_corners_of_lanes_are_mitred(tmp_path):
-    bent = '<edge id="5" from="a" to="d"><lane id="5_0" index="0" width="2" shape="0,50 10,50 10,60"/></edge>'
+    bent = (
+        '<edge id="5" from="a" to="d"><lane id="5_0" index="0" length="98" width="2" shape="0,50 10,50 10,60"/></edge>'
+    )
     lane = lanes(read(tmp_path, more=bent), "5")[-1]
     assert lane.left[1, :2] == pytest.approx([9.0, 51.0])
     assert lane.right[1, :2] == pytest.approx([11.0, 49.0])
@@ -108,6 +113,27 @@ def test_raised_streets_and_their_file_agree(tmp_path):
     assert np.interp([40.0, 69.0], again["2"].s, again["2"].right[:, 2]) == pytest.approx([2.0, 2.5])
     assert again[":b_1"].left[[0, -1], 2] == pytest.approx([3.0, 4.0])
     assert not again["3"].left[:, 2].any()
+
+
+@pytest.mark.parametrize(
+    ("line", "y"),
+    [
+        ([(0, -8), (99, -8)], -8.0),
+        ([(30, -7), (80, -7)], -7.0),
+        ([(0, -2), (99, -2)], -4.45),  # in the carriageway
+        ([(0, 2), (99, 2)], -4.45),  # on the other side of it
+        ([(0, -8), (20, -8)], -4.45),  # along a short part of the street only
+    ],
+)
+def test_people_walk_on_a_mapped_sidewalk(tmp_path, line, y):
+    network = read(tmp_path).walking_on(shapely.MultiLineString([line]))
+    path = tmp_path / "walked.net.xml"
+    path.write_text(network.text, encoding="utf-8")
+    walked = read_network(path)
+    assert walked.lane("2_0").line[:, 1] == pytest.approx(y)
+    assert walked.lane("2_0").line[[0, -1], 0] == pytest.approx([0.0, 98.0])
+    assert walked.lane("3_0").line[:, 1] == pytest.approx(-4.45)
+    assert walked.lane("2_1").line[:, 1] == pytest.approx(-1.6)
 
 
 def test_credits_are_comments_that_xml_allows(tmp_path):

@@ -12,7 +12,7 @@ from seip_addon.core.geometry.geo_reference import projection
 from seip_addon.core.progress import finish
 from seip_addon.core.world.openstreetmap.buildings import USUAL_HEIGHT
 from seip_addon.core.world.openstreetmap.extract import read_extract
-from seip_addon.core.world.openstreetmap.plan_shapes import DRAWN_TWICE, PlanShapes
+from seip_addon.core.world.openstreetmap.plan_shapes import DRAWN_TWICE, PIECES, PlanShapes
 from seip_addon.core.world.openstreetmap.street_objects import surroundings
 from tests.builders.osm_text import Extract
 
@@ -43,29 +43,29 @@ def test_a_footprint_is_that_of_the_extract(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("tags", "height", "base", "roof", "assumed"),
+    ("tags", "height", "base", "assumed"),
     [
-        ({"height": "12 ft"}, 3.6576, 0, 0, False),
-        ({"building:levels": "4"}, 12, 0, 0, False),
-        ({"building:levels": "4", "roof:shape": "gabled", "roof:levels": "1"}, 15, 0, 3, False),
-        ({"building:levels": "3", "roof:shape": "hipped"}, 9 + 2.5, 0, 2.5, False),
-        ({"height": "10", "roof:shape": "gabled", "roof:height": "4"}, 10, 0, 4, False),
-        ({"height": "10", "min_height": "4"}, 6, 4, 0, False),
-        ({"building:levels": "5", "building:min_level": "1"}, 12, 3, 0, False),
-        ({"height": "-5"}, USUAL_HEIGHT, 0, 0, True),
-        ({"height": "1e9", "building:levels": "2"}, 6, 0, 0, False),
-        ({"height": "3;4"}, 4, 0, 0, False),
-        ({"building": "garage"}, 2.8, 0, 0, True),
-        ({"building": "roof", "height": "5"}, 0.4, 4.6, 0, False),
-        ({"height": "5", "roof:shape": "gabled", "roof:height": "50"}, 5, 0, 5, False),
+        ({"height": "12 ft"}, 3.6576, 0, False),
+        ({"building:levels": "4"}, 12, 0, False),
+        ({"building:levels": "4", "roof:shape": "gabled", "roof:levels": "1"}, 15, 0, False),
+        ({"building:levels": "3", "roof:shape": "hipped"}, 9 + 2.5, 0, False),
+        ({"height": "10", "roof:shape": "gabled", "roof:height": "4"}, 10, 0, False),
+        ({"height": "10", "min_height": "4"}, 6, 4, False),
+        ({"building:levels": "5", "building:min_level": "1"}, 12, 3, False),
+        ({"height": "-5"}, USUAL_HEIGHT, 0, True),
+        ({"height": "1e9", "building:levels": "2"}, 6, 0, False),
+        ({"height": "3;4"}, 4, 0, False),
+        ({"building": "garage"}, 2.8, 0, True),
+        ({"building": "roof", "height": "5"}, 0.4, 4.6, False),
+        ({"height": "5", "roof:shape": "gabled", "roof:height": "50"}, 5, 0, False),
     ],
 )
-def test_heights_are_those_of_the_tags(tmp_path, tags, height, base, roof, assumed):
+def test_heights_are_those_of_the_tags(tmp_path, tags, height, base, assumed):
     extract = Extract()
     extract.house(10, 20, 30, 12, **({"height": ""} | tags))
     (building,) = found(extract, tmp_path)[0].buildings
-    got = (building.height, building.base, building.roof.height, building.height_assumed)
-    assert got == (pytest.approx(height), pytest.approx(base), pytest.approx(roof), assumed)
+    got = (building.height, building.base, building.height_assumed)
+    assert got == (pytest.approx(height), pytest.approx(base), assumed)
 
 
 def test_the_rest_of_an_outline_stands_where_parts_do_not_fill_it(tmp_path):
@@ -114,6 +114,23 @@ def test_a_relation_has_courtyards_and_its_ways_count_once(tmp_path, tagged):
     assert building.outline.area == pytest.approx(1200, rel=0.01)
     assert len(building.outline.interiors) == 1
     assert building.height == 9
+
+
+def test_ways_are_joined_to_rings_in_either_direction(tmp_path):
+    extract = Extract()
+    lines = [[(0, 20), (40, 20), (40, 60)], [(0, 60), (20, 70), (40, 60)], [(0, 60), (0, 20)], [(70, 20), (80, 20)]]
+    members = [("way", extract.way(line), "outer") for line in lines]
+    extract.relation(members, type="multipolygon", building="yes")
+    site, shapes = found(extract, tmp_path)
+    assert site.buildings[0].outline.area == pytest.approx(40 * 40 + 40 * 10 / 2, rel=0.01)
+    assert shapes.dropped[PIECES] == 1
+
+
+def test_a_relation_that_the_extract_cuts_off_is_closed_by_a_straight_line(tmp_path):
+    extract = Extract()
+    ways = [extract.way(line) for line in ([(0, 20), (40, 20), (40, 60)], [(40, 60), (20, 70), 999_999, (0, 20)])]
+    extract.relation([("way", way, "outer") for way in ways], type="multipolygon", building="yes")
+    assert found(extract, tmp_path)[0].buildings[0].outline.area == pytest.approx(1400, rel=0.1)
 
 
 @pytest.mark.parametrize(("kind", "width"), [("footway", 2.0), ("service", 3.5), ("cycleway", 2.0)])
@@ -198,6 +215,5 @@ def test_no_tags_and_shapes_break_the_reader(tmp_path_factory, shapes):
     for building in site.buildings:
         assert building.outline.is_valid
         assert 0 < building.height < 1000
-        assert 0 <= building.roof.height <= building.height
     for item in (*site.trees, *site.walls, *site.posts, *site.street_lights):
         assert 0 < item.height <= 80

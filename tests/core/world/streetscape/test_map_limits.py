@@ -9,7 +9,8 @@ import pytest
 from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import finish
 from seip_addon.core.site.roles import Role
-from seip_addon.core.world.streetscape.description import SiteDescription, describe_place, read_site_description
+from seip_addon.core.world.streetscape.description import SiteDescription
+from seip_addon.core.world.streetscape.site_file import describe_place, read_site_description
 from tests.builders.map_models import site_model
 from tests.builders.opendrive_text import document, geometry, lane, read_text, road, section
 from tests.builders.street_map import street_map

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 import shapely
 
@@ -44,9 +45,10 @@ def test_several_crossings_of_one_street_are_told_apart_by_their_arm(tmp_path):
     text = text.replace('<road name="" id="1"', '<road name="Mill Lane" id="1"')
     road_map = read_text(tmp_path, text)
     roads = tuple(replace(one, name="Mill Lane") for one in road_map.roads)
-    east = replace(roads[0].objects[0], s=20.0)
-    roads = (roads[0], *roads[1:2], replace(roads[2], objects=(east,)))
-    model = finish(site_model(replace(road_map, roads=roads), SiteDescription(near=(0.0, 0.0), radius=60.0)))
+    first = road_map.objects[0]
+    east = replace(first, position=first.position + np.array([80.0, 0.0, 0.0]))
+    road_map = replace(road_map, roads=roads, objects=(*road_map.objects, east))
+    model = finish(site_model(road_map, SiteDescription(near=(0.0, 0.0), radius=60.0)))
     found = {place.name: place.polygon.centroid.x for place in model.places}
     assert found == {
         "Mill Lane": pytest.approx(0.0, abs=1.0),

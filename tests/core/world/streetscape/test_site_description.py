@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.world.streetscape.description import read_site_description
+from seip_addon.core.world.streetscape.site_file import read_site_description
 
 FULL = """
 name = "Crossing"

@@ -12,6 +12,7 @@ from seip_addon.core.site.roles import Role
 from seip_addon.core.world.opendrive.read import read_map
 from seip_addon.core.world.streetscape.description import Area, Building, Poles, SiteDescription, Trees
 from tests.builders.map_models import site_model
+from tests.builders.opendrive_text import document, geometry, read_text, road
 from tests.builders.street_map import street_map
 
 MAPS = Path(os.environ.get("SEIP_MAPS") or Path(__file__).resolve().parents[5] / "shared" / "opendrive")
@@ -220,3 +221,9 @@ def test_real_maps_become_one_sound_layer(name, place):
     if name == "Town05":  # its lanes cross each other in every junction
         assert plan_sum(driving) == pytest.approx(plan(driving).area, rel=0.002)
         assert sum(len(each.solid.faces) for each in built.parts) < 20_000
+
+
+def test_a_tunnel_is_named_in_a_note(tmp_path):
+    text = document(road(geometry(length=200.0), objects='<tunnel id="9" name="Hill" s="20" length="80"/>'))
+    model = finish(site_model(read_text(tmp_path, text), SiteDescription(near=(100.0, 0.0), radius=50.0)))
+    assert "tunnel Hill of road 1 is built as an open road, without its walls and its roof" in model.notes

@@ -83,3 +83,14 @@ def test_pavements_meet_the_ends_of_a_crossing(tmp_path):
     for y in crossing.bounds[1::2]:
         assert walked.distance(shapely.Point(x, y)) < 0.2
     assert np.ptp(crossing.bounds[1::2]) == pytest.approx(6.4, abs=0.1)
+
+
+def test_posts_keep_off_islands_that_are_wider_than_a_median(tmp_path):
+    extract = crossroads()
+    extract.way(
+        [(60, 0), (80, 9), (110, 9), (130, 0)], highway="secondary", name="East Road", oneway="yes", sidewalk="no"
+    )
+    extract.way([(75, 4), (115, 4)], highway="footway", footway="sidewalk")
+    model = built(extract, tmp_path)
+    islands = [part for part in model.parts if part.keep_off == "islands"]
+    assert plan(islands).contains(shapely.Point(95, 4.5))
