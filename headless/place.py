@@ -20,6 +20,7 @@ if not __package__:  # run as a file by `blender -P`
 
 from headless import runtime, survey
 from headless.charts.robustness import save_evaluation_charts
+from headless.finalists import add_finalists, check_finalists, judge
 from headless.options import add_settings, new_parser, read_settings, real_number
 
 import bpy
@@ -115,6 +116,7 @@ def main(argv: list[str]) -> None:
     """Place sensors in a scene and write the result to a folder."""
     options = _parser().parse_args(argv)
     objective = read_objective(options)
+    check_finalists(options, objective)
     if options.require == []:
         runtime.open_scene(options.scene)
         objective = replace(objective, mandatory=tuple(sensor_positions(bpy.context.scene)))
@@ -131,8 +133,12 @@ def main(argv: list[str]) -> None:
         runtime.LOG.info(runs.overlap)
     acceptance = runtime.accepted_by_enter()
     solution = watch.run("placement", place(surveyed, objective, runs, acceptance))
-    runtime.print_line(_describe(solution))
+    if options.finalists is None:
+        runtime.print_line(_describe(solution))
     solution = watch.run("fewer and more sensors", with_context(surveyed, solution, acceptance))
+    if options.finalists is not None:
+        solution = judge(surveyed, watch, solution, options)
+        runtime.print_line(_describe(solution))
     with runtime.incomplete_if_interrupted(options.output):
         save_evaluation_charts(options.output, surveyed, solution)
         survey.save_solution(surveyed, watch, solution, options.output, render=not options.no_render)
@@ -164,6 +170,7 @@ def _parser() -> argparse.ArgumentParser:
     parser = new_parser("place", "Place roadside LiDARs in a scene.")
     survey.add_options(parser)
     add_objective(parser)
+    add_finalists(parser)
     parser.add_argument("--no-render", action="store_true", help="leave out the rendered view")
     return parser
 

@@ -100,7 +100,12 @@ def add_survey_settings(parser: argparse.ArgumentParser) -> tuple[argparse._Argu
 
 def runs_beside(scene: Path | None, kind: str = "") -> list[Path]:
     """Return the runs in the `traffic_folder` of a scene, or of the one that is open."""
-    return runs_in(traffic_folder(Path(bpy.data.filepath) if scene is None else scene, kind))
+    return runs_in(traffic_folder(scene_path(scene), kind))
+
+
+def scene_path(scene: Path | None) -> Path:
+    """Return the file of a scene, or of the one that is open."""
+    return Path(bpy.data.filepath) if scene is None else scene
 
 
 def survey(options: argparse.Namespace, check: Callable[[Layout], None]) -> tuple[Survey, Stopwatch]:

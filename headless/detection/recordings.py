@@ -13,8 +13,10 @@ import numpy as np
 from seip_addon.core.arrays import Boolean, Float
 from seip_addon.core.errors import SeipError
 from seip_addon.core.limits import FRAMES, TIME_STEP
+from seip_addon.core.output.results.versions import versions
 from seip_addon.core.progress import finish
 from seip_addon.core.sensing.scans.frame import Frame
+from seip_addon.core.sensing.scans.run_folder import Run
 from seip_addon.core.sensing.scans.sensor import MountedSensor
 from seip_addon.core.sensing.scans.simulation import ScanSettings, Simulation, prepare
 from seip_addon.core.sensing.scans.static_scene import static_scene
@@ -130,3 +132,26 @@ class Simulator:
     def _prepared(self, configuration: MountedSensors, run: SampledRun) -> Simulation:
         bodies = [fitted_body(user) for user in run.trajectories.users]
         return finish(prepare(self.static, configuration.sensors, run.trajectories, bodies, self.settings))
+
+
+def poses_key(configuration: MountedSensors) -> str:
+    """Return a digest of the sensors' types and poses."""
+    return digest(*(part for one in configuration.sensors for part in (one.model.key, one.xyz, one.orientation)))
+
+
+def frames_key(simulator: Simulator, configuration: MountedSensors, runs: Sequence[SampledRun]) -> str:
+    """Return a digest of all that the frames of some runs follow from."""
+    scans = (
+        Run(
+            static=simulator.static,
+            origin=run.trajectories.origin,
+            sensors=configuration.sensors,
+            trajectories=run.trajectories,
+            bodies=[fitted_body(user) for user in run.trajectories.users],
+            times=run.times,
+            settings=simulator.settings,
+            versions=versions(),
+        )
+        for run in runs
+    )
+    return digest(*(scan.key for scan in scans))

@@ -35,6 +35,9 @@ RULES = {
 
 MAIN_RULE = next(iter(RULES.values()))
 
+CLASSES = {"vehicles": "bev_0.7", "two-wheelers": "motorcycle_bicycle_0.5", "pedestrians": "pedestrian_0.5"}
+"""Rule for each class of road users by which placements are compared; the first is the study's own."""
+
 
 def precision_by(frames: Sequence[FrameResult], rule: Rule) -> Precision:
     """Return the average precision of all detections by a rule."""

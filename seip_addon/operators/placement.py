@@ -7,11 +7,12 @@ from collections.abc import Generator
 from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Literal
 
 import bpy
 
-from .. import scene_survey, selection
+from .. import preferences, scene_status, scene_survey, selection
 from ..core.acceptance import Acceptance
 from ..core.choosing.placement.objective import Objective, check_objective
 from ..core.errors import SeipError
@@ -19,18 +20,37 @@ from ..core.output.results.answer import answer
 from ..core.output.results.placement_record import Provenance
 from ..core.output.results.versions import versions
 from ..core.progress import Progress
+from ..core.storage.files import unfinished_name
+from ..core.workflows.detection import DetectionJob
+from ..core.workflows.finalists import check_judged, find_finalists, judge_elsewhere, judged_solution
 from ..core.workflows.placing import place, with_context
 from ..core.workflows.records import record_of
 from ..core.workflows.traffic_runs import found_runs, read_runs
-from ..properties.conversion import runs_folder
+from ..properties.conversion import output_folder, runs_folder
+from ..scene.blend_file import save_blend
 from ..scene.write import write_result
 from ..session import SceneState
 from ..viewport import coverage
-from .base import ForReadyScene, LongWork, Outcome, attempt
+from .base import Conditional, ForReadyScene, LongWork, Outcome, attempt, started
+from .detection import NO_PYTHON, folder_of_result
 from .results import keep_result
 
 
-class SEIP_OT_solve_placement(ForReadyScene, LongWork[SceneState], bpy.types.Operator):
+class _Placing(LongWork[SceneState]):
+    """A mixin: work that ends with a placement."""
+
+    def conclude(self, scene: bpy.types.Scene, result: SceneState) -> None:
+        """Put the sensors into the scene, and all that is needed to go on later into the file."""
+        survey, solution = result.placed()
+        provenance = Provenance(datetime.now(UTC), result.durations, versions(blender=bpy.app.version_string))
+        record = record_of(survey, solution, provenance)
+        write_result(scene, survey.site, solution.deployment)
+        keep_result(scene, result, record)
+        coverage.show_colours(scene)
+        self.report({"INFO"}, " ".join(answer(record)[:2]))  # type: ignore[attr-defined]  # of Blender's operators
+
+
+class SEIP_OT_solve_placement(ForReadyScene, _Placing, bpy.types.Operator):
     """Choose the best sensors for the number, budget or coverage, and place them in the scene"""
 
     bl_idname = "seip.solve_placement"
@@ -44,15 +64,54 @@ class SEIP_OT_solve_placement(ForReadyScene, LongWork[SceneState], bpy.types.Ope
         self.acceptance = Acceptance()
         return _placed(scene_survey.survey(scene), objective, folder, self.acceptance)
 
-    def conclude(self, scene: bpy.types.Scene, result: SceneState) -> None:
-        """Put the sensors into the scene, and all that is needed to go on later into the file."""
-        survey, solution = result.placed()
-        provenance = Provenance(datetime.now(UTC), result.durations, versions(blender=bpy.app.version_string))
-        record = record_of(survey, solution, provenance)
-        write_result(scene, survey.site, solution.deployment)
-        keep_result(scene, result, record)
-        coverage.show_colours(scene)
-        self.report({"INFO"}, " ".join(answer(record)[:2]))
+
+class SEIP_OT_judge_placement(Conditional, _Placing, bpy.types.Operator):
+    """Place sensors, and choose among twelve good placements by what a detector finds with them in runs of traffic; runs in a separate Python with PyTorch"""  # noqa: E501  # a tooltip is one line
+
+    bl_idname = "seip.judge_placement"
+    bl_label = "Judge by Detection"
+
+    @classmethod
+    def why_not(cls, context: bpy.types.Context) -> str:
+        """Return a reason if an input of a placement, or a Python with PyTorch, is missing."""
+        return scene_status.obstacle(context.scene) or ("" if preferences.detecting_python() is not None else NO_PYTHON)
+
+    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, SceneState]:
+        """Read the scene where it has changed, save it for the process that judges, and state the objective."""
+        seip, python = scene.seip, preferences.detecting_python()
+        if python is None:
+            raise SeipError(NO_PYTHON)
+        objective = seip.goal.objective()
+        check_judged(objective)
+        runs = tuple(found_runs(runs_folder(seip.goal.runs)))
+        job = DetectionJob(python, runs, None, preferences.catalogue_files(), seip.survey.weather())
+        folder = output_folder(seip.detection.folder, "the detections")
+        self.acceptance = Acceptance()
+        return started(_judged(scene_survey.survey(scene), objective, job, folder, self.acceptance))
+
+
+def _judged(
+    surveying: Generator[Progress, None, SceneState],
+    objective: Objective,
+    job: DetectionJob,
+    folder: Path,
+    acceptance: Acceptance,
+) -> Generator[Progress, None, SceneState]:
+    """Place sensors, and choose among finalists; detections are kept in a folder."""
+    with (
+        folder_of_result(folder),
+        TemporaryDirectory(prefix=unfinished_name(folder, "judging-").name, dir=folder) as temporary,
+    ):
+        scene = Path(temporary) / "site.blend"
+        save_blend(scene)
+        yield Progress(0, 0, "placing sensors")
+        state = yield from _placed(surveying, objective, None, acceptance)
+        survey, solution = state.placed()
+        began = time.perf_counter()
+        request = yield from find_finalists(survey, solution)
+        judgement = yield from judge_elsewhere(job, request, scene, folder)
+        solution = yield from judged_solution(survey, solution, judgement)
+        return replace(state, solution=solution, durations=state.timed("judging", began))
 
 
 def _placed(
@@ -137,4 +196,10 @@ class SEIP_OT_remove_rule(bpy.types.Operator):
         return {"FINISHED"}
 
 
-CLASSES = (SEIP_OT_solve_placement, SEIP_OT_choose_number, SEIP_OT_add_rule, SEIP_OT_remove_rule)
+CLASSES = (
+    SEIP_OT_solve_placement,
+    SEIP_OT_judge_placement,
+    SEIP_OT_choose_number,
+    SEIP_OT_add_rule,
+    SEIP_OT_remove_rule,
+)

@@ -16,7 +16,7 @@ from ..core.output.results.answer import answer, sentence, status_text
 from ..core.output.results.placement_file import parsed_record
 from ..core.output.results.placement_record import PlacementRecord, relevant_warnings
 from ..core.workflows.traffic_runs import traffic_folder
-from ..operators.placement import SEIP_OT_choose_number, SEIP_OT_solve_placement
+from ..operators.placement import SEIP_OT_choose_number, SEIP_OT_judge_placement, SEIP_OT_solve_placement
 from ..operators.results import SEIP_OT_evaluate_sensors, no_placement
 from ..operators.sensors import SEIP_MT_survey_presets, SEIP_OT_add_survey_preset
 from ..operators.visibility import SEIP_OT_compare_scene
@@ -86,6 +86,7 @@ def draw(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
         draw_sentence(layout, obstacle, icon="ERROR")
     if not no_placement(scene):
         _draw_answer(layout, scene)
+    draw_run(layout, SEIP_OT_judge_placement.bl_idname)
     draw_sections(
         layout,
         {
@@ -197,6 +198,8 @@ def _draw_answer(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
     column.active = not doubts
     if scene.seip.result.change:
         draw_sentence(column, scene.seip.result.change, icon="INFO", reserved=BOX)
+    if doubts and record.judgement is not None:
+        draw_sentence(column, "The AP is that of the earlier poses.", icon="INFO", reserved=BOX)
     for text in answer(record):
         draw_sentence(column, text, reserved=BOX)
     others = {"numbers": partial(_draw_numbers, goal=scene.seip.goal, certain=not doubts)} if numbers(record) else {}

@@ -1,4 +1,7 @@
-"""Opening and saving .blend files."""
+"""Opening and saving .blend files.
+
+`tests/scene/test_blend_file.py` shows its use.
+"""
 
 from __future__ import annotations
 

@@ -89,6 +89,8 @@ def test_without_torch_one_sentence_says_what_to_install_and_where(placed, monke
     sentence = r"needs a Python with PyTorch: .*pip install '\.\[detection\]'.*in the extension's preferences\."
     with pytest.raises(RuntimeError, match=sentence):
         bpy.ops.seip.detect()
+    with pytest.raises(RuntimeError, match=sentence):
+        bpy.ops.seip.judge_placement()
     said, _ = drawn(monkeypatch)
     assert len(said) == 1
     assert re.search(sentence, said[0])

@@ -17,7 +17,8 @@ from headless.detection.average_precision import (
 from headless.detection.detector import Detector
 from headless.detection.frame_results import FrameResult
 from headless.detection.recordings import SampledRun, Simulator
-from headless.detection.rules import RULES, precision_by
+from headless.detection.rules import CLASSES, RULES, precision_by
+from headless.detection.shared_scans import SharedScans, detect_with_all
 from headless.studies.detection.sensor_configuration import SensorConfiguration
 
 import numpy as np
@@ -31,8 +32,7 @@ from seip_addon.core.workflows.survey import Survey
 from .agreement import correlate
 from .drawing import MIN_PLACEMENTS, draw_from_pool
 from .pose_criteria import PoseCriterion
-from .precision import CLASSES, Precisions
-from .shared_scans import SharedScans, detect_with_all
+from .precision import Precisions
 from .site_criteria import CRITERIA, best_of, problem_of, site_criteria
 
 POOL = 18  # poses of which placements of several sensors are drawn, next to those that criteria like best
@@ -245,7 +245,7 @@ def study_type(
     placed = yield from choose_placements(survey, criteria, settings)
     everything = [one for some in placed for one in some.configurations]
     shared = SharedScans(simulator, everything)
-    found = iter((yield from detect_with_all(shared, simulator, tests, detector, folder)))
+    found = iter((yield from detect_with_all(shared, tests, detector, folder)))
     frames = tuple(tuple(next(found) for _ in some.configurations) for some in placed)
     return StudiedType(survey.site.name, next(iter(survey.models)), criteria, placed, frames)
 

@@ -17,8 +17,6 @@ from seip_addon.core.estimates import RESAMPLES
 TRAFFIC_SEED, TRAINING_SEED, PLACEMENT_SEED = 0, 1, 2  # of resamples: draws of one must not follow from another's
 RESAMPLES_AT_ONCE = 100  # the number that needs a few hundred megabytes
 FOLDER = "detections"  # of the folder of results: what was detected with each placement
-CLASSES = {"vehicles": "bev_0.7", "two-wheelers": "motorcycle_bicycle_0.5", "pedestrians": "pedestrian_0.5"}
-"""Rules of average precision for each class of road users; the first is the study's own."""
 
 
 @dataclass(frozen=True, eq=False)

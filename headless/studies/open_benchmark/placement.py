@@ -8,10 +8,9 @@ from pathlib import Path
 from headless import survey
 from headless.detection.detector import SHIPPED_DETECTOR, Detector
 from headless.detection.recordings import MountedSensors, Simulator, sampled_runs
-from headless.detection.rules import RULES, precision_by
-from headless.studies.criteria.precision import CLASSES
+from headless.detection.rules import CLASSES, RULES, precision_by
+from headless.detection.shared_scans import SharedScans, detect_with_all
 from headless.studies.detection.case_study import split_untrained
-from headless.studies.stored_detections import stored_detections
 
 import bpy
 import numpy as np
@@ -61,7 +60,7 @@ def placement_precision(folder: Path, placed: Path, every: float, output: Path) 
     detector = Detector.load(SHIPPED_DETECTOR)
     simulator = Simulator(geometry, ScanSettings(rolling_shutter=True), sensors)  # as the table was made
     placement = MountedSensors(placed.stem, sensors)
-    (frames,) = yield from stored_detections(simulator, placement, [detector], tests, output / "detections")
+    (frames,) = yield from detect_with_all(SharedScans(simulator, [placement]), tests, detector, output)
     found = {}
     for name, rule in CLASSES.items():
         one = precision_by(frames, RULES[rule])

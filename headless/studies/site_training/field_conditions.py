@@ -13,8 +13,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from headless.detection.detection_area import DetectionArea
+from headless.detection.frame_points import POINT_FIELDS, recounted, some_points
 from headless.detection.frames import LazyFrames, Recording
-from headless.studies.frame_points import POINT_FIELDS, recounted, some_points
 
 import numpy as np
 from numpy.typing import NDArray

@@ -2,7 +2,7 @@
 
 import os
 import re
-from collections.abc import Generator
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -64,15 +64,19 @@ class DetectionJob:
 
     def command(self, scene: Path, output: Path) -> list[str]:
         """Return the command for a .blend with sensors and a folder of results."""
-        words: list[str | Path] = [self.python.program, "-m", "headless", "detect", scene, "-o", output]
-        words += ["--traffic", *self.runs]
+        words = [self.python.program, "-m", "headless", "detect", scene, "-o", output, *self.options()]
+        return [os.fspath(word) for word in words]
+
+    def options(self) -> list[str | Path]:
+        """Return the options that name the runs, the detector, catalogues and the weather."""
+        words: list[str | Path] = ["--traffic", *self.runs]
         for option, values in (
             ("--detector", (self.detector,) if self.detector is not None else ()),
             ("--catalogue", self.catalogue),
             ("--weather", self.weather.words()),
         ):
             words += [option, *values] if values else []
-        return [os.fspath(word) for word in words]
+        return words
 
 
 def detect_elsewhere(job: DetectionJob, scene: Path, folder: Path) -> Generator[Progress, None, str]:
@@ -101,18 +105,7 @@ def detect_elsewhere(job: DetectionJob, scene: Path, folder: Path) -> Generator[
         The command fails, or its result cannot be read or written.
     """
     results, log = scene.parent / "results", scene.parent / "log"
-    variables = {"PYTHONUTF8": "1", "SEIP_SECONDS_BETWEEN_LINES": _SECONDS_BETWEEN_LINES}
-    running = run_logged(job.command(scene, results), log, _progress, folder=job.python.folder, environment=variables)
-    try:
-        status = yield from running
-    except OSError as error:
-        raise SeipError(
-            f"{job.python.program} cannot be started ({error.strerror}): name the Python with PyTorch in the "
-            "preferences of the extension"
-        ) from error
-    output = log.read_text(encoding="utf-8", errors="replace")
-    if status != 0:
-        raise SeipError(_failure(output, status, job.python.program))
+    yield from run_elsewhere(job.python, job.command(scene, results), log)
     try:
         text = (results / RECORD).read_text(encoding="utf-8")
         parsed_detection(text)
@@ -121,6 +114,27 @@ def detect_elsewhere(job: DetectionJob, scene: Path, folder: Path) -> Generator[
         reason = error.strerror or str(error)
         raise SeipError(f"cannot write to {folder}: {reason}; choose a folder that you may write to") from error
     return text
+
+
+def run_elsewhere(python: DetectingPython, command: Sequence[str | Path], log: Path) -> Generator[Progress, None, None]:
+    """Run a command of this project in a Python with PyTorch, with its output in a file.
+
+    Raises
+    ------
+    SeipError
+        It cannot be started, or fails; with its own reason.
+    """
+    words = [os.fspath(word) for word in command]
+    variables = {"PYTHONUTF8": "1", "SEIP_SECONDS_BETWEEN_LINES": _SECONDS_BETWEEN_LINES}
+    try:
+        status = yield from run_logged(words, log, _progress, folder=python.folder, environment=variables)
+    except OSError as error:
+        raise SeipError(
+            f"{python.program} cannot be started ({error.strerror}): name the Python with PyTorch in the "
+            "preferences of the extension"
+        ) from error
+    if status != 0:
+        raise SeipError(_failure(log.read_text(encoding="utf-8", errors="replace"), status, python.program))
 
 
 def _progress(output: str) -> Progress:

@@ -105,7 +105,8 @@ def restored_solution(survey: Survey, record: PlacementRecord) -> Generator[Prog
     known = replace(survey.deploy(chosen), gain_band=record.coverage.gain_band, returns=record.returns)
     if record.returns is not None:
         known = replace(known, pedestrian_returns=stored_pedestrian_returns(survey, chosen))
-    return Solution(objective, record.placement, None, known, front=record.front, crossings=record.crossings)
+    solution = Solution(objective, record.placement, None, known, judgement=record.judgement)
+    return replace(solution, front=record.front, crossings=record.crossings)
 
 
 def _restored_by_hand(survey: Survey, record: PlacementRecord) -> Generator[Progress, None, Solution]:

@@ -7,10 +7,10 @@ import pytest
 
 pytest.importorskip("torch", reason="torch is not installed: make detection")
 
+from headless.detection import shared_scans
 from headless.detection.average_precision import evaluate
 from headless.detection.matching import Rule
 from headless.studies.criteria import command as criteria_study
-from headless.studies.criteria import shared_scans
 from headless.studies.criteria.criteria_table import difference_of
 
 import numpy as np

@@ -8,8 +8,8 @@ import pytest
 pytest.importorskip("torch", reason="torch is not installed: make detection")
 
 from headless.detection.detector import Detector
+from headless.detection.recordings import poses_key
 from headless.detection.settings import NetworkSettings
-from headless.studies.simulated_recordings import poses_key
 from headless.studies.site_training import command as train_on_sites
 from headless.studies.site_training.random_placements import MAX_SENSORS, random_placement
 

@@ -17,6 +17,7 @@ from ...settings import setting
 from ...site.site import Candidates, Site
 from ..robustness.comparison import Comparison
 from .deployment import BAND, UNRANKED, Deployment, pose_prices
+from .judgement import Judgement
 from .problem import Placement, PlacementConstraints, PlacementProblem
 from .returns_summary import CrossingReturns
 from .risk import Failure, Risk
@@ -226,6 +227,8 @@ class Solution:
         Best placements found with fewer and more sensors; see `front_of`. Empty if they were not searched for.
     crossings : tuple of CrossingReturns
         Expected returns from a pedestrian on each crossing, of all sensors together. Empty if not computed.
+    judgement : Judgement, optional
+        What a detector finds with the placement and with other finalists, if it was chosen among such.
     """
 
     objective: Objective
@@ -235,6 +238,7 @@ class Solution:
     evaluation: Comparison | None = None
     front: tuple[FrontPoint, ...] = ()
     crossings: tuple[CrossingReturns, ...] = ()
+    judgement: Judgement | None = None
 
     @property
     def certificate(self) -> str:

@@ -459,6 +459,7 @@ def _other_choices(evidence: Evidence) -> Iterator[Block]:
     elsewhere = (POSE_ERRORS, CHOSEN_FOR, BAND, UNRANKED, FEW, *LOCATED_FILES, *([SAME_PRICE] if same_price else []))
     notes = [sentence(note) for note in record.notes if not note.startswith(elsewhere)]
     notes += [same_price] if same_price else []
+    notes += [] if record.judgement is None else record.judgement.sentences()
     notes.append("“Proven” refers to the model: this scene, these sensor models and this definition of seen.")
     yield Bullets(tuple(notes))
     if record.returns is not None and record.returns.front:

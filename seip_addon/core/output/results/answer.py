@@ -38,16 +38,17 @@ def answer(record: PlacementRecord) -> tuple[str, ...]:
     Returns
     -------
     tuple of str
-        Two or three sentences.
+        Two or three sentences, and those of a judgement by detection.
     """
     lines = [f"{_achievement(record)} {_outlook(record)}", _price(record)]
-    return tuple(filter(None, (*lines, recommendation(record))))
+    judged = () if record.judgement is None else record.judgement.sentences()
+    return tuple(filter(None, (*lines, *judged, recommendation(record))))
 
 
 def recommendation(record: PlacementRecord) -> str:
     """Return the most useful next step to a better or cheaper placement, or "" if none stands out."""
     more = possible_improvement(record)
-    if more is not None and more >= LARGE_GAP:
+    if more is not None and more >= LARGE_GAP and record.judgement is None:
         return "Search longer for a better placement: raise the effort."
     crossing = min(record.returns.crossings, key=lambda one: one.least, default=None) if record.returns else None
     if crossing is not None and crossing.least < FEW_RETURNS:
@@ -63,8 +64,11 @@ def change_text(record: PlacementRecord, previous: PlacementRecord) -> str:
     """Return whether a placement is better or worse than the previous one, or "" if they cannot be compared.
 
     Placements are compared by what both were chosen for, on the same number of targets: returns from road users, or
-    coverage. The difference in price is added, as a smaller number of sensors is worse and cheaper.
+    coverage. The difference in price is added, as a smaller number of sensors is worse and cheaper. One that was chosen
+    by detection is not compared: it may be worse by the criterion, and better.
     """
+    if record.judgement is not None:
+        return ""
     comparable = record.counts.targets == previous.counts.targets and record.site.name == previous.site.name
     if not comparable or (record.returns is None) != (previous.returns is None):
         return ""
@@ -122,6 +126,7 @@ def _outlook(record: PlacementRecord) -> str:
     if objective.status == MOVED:
         return "Sensors were moved by hand."
     what = purpose(record.notes) if record.returns is None else ""  # else the sentence before has said it
+    what += "" if record.judgement is None else " by the criterion"
     better = "cheaper" if objective.cheapest else "better"
     if objective.status == "optimal":
         return f"No placement of these candidates is {better}{what}."

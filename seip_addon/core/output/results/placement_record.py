@@ -15,6 +15,7 @@ import numpy as np
 
 from ...arrays import Float, Integer
 from ...choosing.placement.deployment import GainBand, Sensor, TypeBand, price_text
+from ...choosing.placement.judgement import Judgement
 from ...choosing.placement.objective import FrontPoint, Solution
 from ...choosing.placement.problem import Placement
 from ...choosing.placement.returns_summary import CrossingReturns, ReturnsPoint, ReturnsSummary, share_reached
@@ -241,6 +242,8 @@ class PlacementRecord:
         Best placements found with fewer and more sensors; records of earlier versions lack it.
     crossings : tuple of CrossingReturns
         Expected returns from a pedestrian on each crossing; records of earlier versions lack them.
+    judgement : Judgement, optional
+        What a detector finds with it and with other finalists, where the placement was chosen among such.
     """
 
     site: RecordedSite
@@ -260,6 +263,7 @@ class PlacementRecord:
     returns: ReturnsSummary | None = None
     front: tuple[FrontPoint, ...] = ()
     crossings: tuple[CrossingReturns, ...] = ()
+    judgement: Judgement | None = None
 
     @cached_property
     def request(self) -> RecordedSettings:
@@ -335,7 +339,7 @@ def placement_record(
             *(site.name, _metres(site.origin), _geo_reference(site.geo_reference)),
             *(site.sources, site.attribution, site.assumptions),
         ),
-        sensors=tuple(_sensor(sensor, site) for sensor in deployment.sensors),
+        sensors=tuple(recorded_sensor(sensor, site) for sensor in deployment.sensors),
         price_usd=_rounded(deployment.price, 2),
         coverage=RecordedCoverage(
             whole=_share(deployment.coverage),
@@ -368,6 +372,7 @@ def placement_record(
         returns=deployment.returns and _rounded_returns(deployment.returns),
         front=tuple(_rounded_point(point) for point in solution.front),
         crossings=_rounded_crossings(solution.crossings),
+        judgement=solution.judgement,
     )
 
 
@@ -375,7 +380,7 @@ def _without_absent(items: list[tuple[str, Any]]) -> dict[str, Any]:
     return {name: value for name, value in items if name not in _LEFT_OUT or value is not None}
 
 
-_LEFT_OUT = {"roll_deg", "installation_usd", "returns"}  # where there are none
+_LEFT_OUT = {"roll_deg", "installation_usd", "returns", "judgement"}  # where there are none
 
 
 def _geo_reference(known: GeoReference) -> RecordedGeoReference | None:
@@ -386,7 +391,8 @@ def _geo_reference(known: GeoReference) -> RecordedGeoReference | None:
     )
 
 
-def _sensor(sensor: Sensor, site: Site) -> RecordedSensor:
+def recorded_sensor(sensor: Sensor, site: Site) -> RecordedSensor:
+    """Return the record of a sensor of a deployment on a site."""
     place = site.geographic(sensor.xyz[None])
     longitude, latitude, altitude = (None, None, None) if place is None else place[0]
     map_xyz = sensor.xyz + site.origin

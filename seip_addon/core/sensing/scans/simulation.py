@@ -1,4 +1,7 @@
-"""Frames of scans: all sensors of a scene at the same instants of its traffic."""
+"""Frames of scans: all sensors of a scene at the same instants of its traffic.
+
+`tests/core/sensing/scans/test_scans.py` shows its use.
+"""
 
 from __future__ import annotations
 

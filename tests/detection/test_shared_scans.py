@@ -8,12 +8,13 @@ pytest.importorskip("torch", reason="torch is not installed: make detection")
 
 from headless import survey
 from headless.detection.recordings import MountedSensors, Simulator, sampled_runs
+from headless.detection.shared_scans import SharedScans, detect_with_all
 from headless.options import new_parser
-from headless.studies.criteria.shared_scans import SharedScans
 
 import numpy as np
 
 from seip_addon.core.choosing.placement.deployment import sensor_at
+from seip_addon.core.progress import finish
 from seip_addon.core.sensing.scans.frame import Labels
 from seip_addon.core.sensing.scans.sensor import MountedSensor
 from seip_addon.core.sensing.scans.simulation import ScanSettings
@@ -39,7 +40,8 @@ def test_frames_are_bit_for_bit_those_of_each_placement_alone(surveyed, small_sc
     simulator = Simulator(surveyed.geometry, ScanSettings(seed=3, rolling_shutter=rolling))
     shared = SharedScans(simulator, placements)
     for run in runs:
-        found = list(shared.frames(run))
+        finish(shared.cast(run))
+        found = list(shared.frames(run, range(len(run.times)), range(3)))
         assert [number for number, _ in found] == [0, 1, 2] * len(run.times)
         for place, (number, frame) in enumerate(found):
             alone = simulator.frame(placements[number], run, place // 3)
@@ -47,3 +49,9 @@ def test_frames_are_bit_for_bit_those_of_each_placement_alone(surveyed, small_sc
                 np.testing.assert_array_equal(getattr(frame, name), getattr(alone, name))
             for part in fields(Labels):
                 np.testing.assert_array_equal(getattr(frame.labels, part.name), getattr(alone.labels, part.name))
+
+
+def test_runs_that_have_no_such_frames_are_left_out(surveyed, small_scene, tmp_path):
+    runs = sampled_runs(survey.runs_beside(small_scene)[:2], surveyed.geometry.origin, 3.0)
+    shared = SharedScans(Simulator(surveyed.geometry, ScanSettings()), [MountedSensors("none", ())] * 2)
+    assert finish(detect_with_all(shared, runs, None, tmp_path, instants=slice(len(runs[0].times), None))) == [[], []]

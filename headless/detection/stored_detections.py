@@ -1,23 +1,16 @@
 """Detections with placements, kept on disk, so that a study that was stopped goes on."""
 
-from collections.abc import Generator, Sequence
+from collections.abc import Sequence
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
-from headless.detection.detector import Detector
-from headless.detection.detector_evaluation import detect_in_runs
-from headless.detection.frame_results import EvaluatedBoxes, FrameResult, GroundTruth
-from headless.detection.recordings import MountedSensors, SampledRun, Simulator
-from headless.studies.simulated_recordings import frames_key
-
 import numpy as np
 from numpy.typing import NDArray
 
-from seip_addon.core.progress import Progress
 from seip_addon.core.storage.array_file import ArrayFile
-from seip_addon.core.storage.files import digest
-from seip_addon.core.storage.source_digest import source_digest
+
+from .frame_results import EvaluatedBoxes, FrameResult, GroundTruth
 
 TABLES = {"truth": GroundTruth, "detected": EvaluatedBoxes}
 TYPES = {"category": "U", "points": "i8", "inside": "b1", "parked": "b1"}  # of columns; of others float64
@@ -32,30 +25,6 @@ def _types() -> dict[str, str]:
 
 
 FILE = ArrayFile("seip.detections", 1, "file of detections", "delete it, and it is made again", _types())
-
-
-def stored_detections(
-    simulator: Simulator,
-    placement: MountedSensors,
-    detectors: Sequence[Detector],
-    runs: Sequence[SampledRun],
-    folder: Path,
-) -> Generator[Progress, None, tuple[list[FrameResult], ...]]:
-    """Return the results of frames with a placement for each detector, from their files if these exist.
-
-    Parameters
-    ----------
-    folder : path
-        Folder of the files, each named by a digest of everything that the results depend on.
-    """
-    scene = digest(source_digest(detect_in_runs.__module__), frames_key(simulator, placement, runs))
-    paths = [folder / f"{digest(scene, detector.key)[:32]}.npz" for detector in detectors]
-    missing = [number for number, path in enumerate(paths) if not path.exists()]
-    if missing:
-        found = yield from detect_in_runs(simulator, placement, runs, [detectors[number] for number in missing], 1)
-        for number, frames in zip(missing, found, strict=True):
-            save_frames(paths[number], frames)
-    return tuple(load_frames(path) for path in paths)
 
 
 def save_frames(path: Path, frames: Sequence[FrameResult]) -> None:

@@ -1,0 +1,165 @@
+"""Detection with many placements that share poses: each pose scans a frame once, for all placements that have it."""
+
+from collections.abc import Generator, Iterator, Mapping, Sequence
+from pathlib import Path
+
+from seip_addon.core.progress import Progress
+from seip_addon.core.sensing.scans.frame import Frame
+from seip_addon.core.sensing.scans.scanner import Scanner
+from seip_addon.core.sensing.scans.sensor import MountedSensor
+from seip_addon.core.sensing.scans.simulation import Simulation, body_surfaces, prepare
+from seip_addon.core.sensing.traffic.bodies import Body, fitted_body
+from seip_addon.core.storage.files import digest
+from seip_addon.core.storage.source_digest import source_digest
+
+from .detector import Detector
+from .detector_evaluation import AT_ONCE, side_by_side
+from .frame_points import some_points
+from .frame_results import FrameResult, frame_result
+from .inference import detect
+from .recordings import MountedSensors, SampledRun, Simulator, frames_key
+from .stored_detections import load_frames, save_frames
+from .training import deterministic
+
+FOLDER = "detections"
+
+
+class SharedScans:
+    """The sensors of several placements at a site, each of which casts its rays at the static scene once.
+
+    Frames have the same bytes as those of `Simulator.frame`: what a sensor's rays meet does not depend on the other
+    sensors, and noise and losses are drawn for each placement, by the sensor's place in it.
+
+    Parameters
+    ----------
+    placements : sequence of MountedSensors
+    """
+
+    def __init__(self, simulator: Simulator, placements: Sequence[MountedSensors]) -> None:
+        self.simulator, self.placements = simulator, placements
+        mounted: dict[tuple[object, ...], MountedSensor] = {}
+        keys = [[_key(sensor) for sensor in one.sensors] for one in placements]
+        for one, own in zip(placements, keys, strict=True):
+            mounted.update(zip(own, one.sensors, strict=True))
+        numbers = {key: number for number, key in enumerate(mounted)}
+        self._sensors = tuple(mounted.values())
+        self._parts = [[numbers[key] for key in own] for own in keys]
+        self._scanners: list[Scanner] = []
+
+    def cast(self, run: SampledRun) -> Generator[Progress, None, None]:
+        """Cast the rays at the static scene, before frames of any run are made."""
+        if not self._scanners:
+            first = yield from prepare(
+                self.simulator.static, self._sensors, run.trajectories, _bodies(run), self.simulator.settings
+            )
+            self._scanners = list(first.scanners)
+
+    def frames(self, run: SampledRun, numbers: Sequence[int], placements: Sequence[int]) -> Iterator[tuple[int, Frame]]:
+        """Yield frames of a run with the number of their placement: of all placements at each instant in turn.
+
+        Parameters
+        ----------
+        numbers : sequence of int
+            Numbers of the frames in the run.
+        placements : sequence of int
+            Numbers of the placements.
+        """
+        used = sorted({pose for placement in placements for pose in self._parts[placement]})
+        simulation = self._simulation(run, used)
+        own = {placement: [used.index(pose) for pose in self._parts[placement]] for placement in placements}
+        parts = {placement: simulation.part(poses) for placement, poses in own.items()}
+        for number in numbers:
+            snapshot = run.trajectories.at(float(run.times[number]))
+            scans = simulation.scans(snapshot)
+            for placement, part in parts.items():
+                yield placement, part.measure(number, snapshot, [scans[pose] for pose in own[placement]])
+
+    def _simulation(self, run: SampledRun, poses: Sequence[int]) -> Simulation:
+        simulator = self.simulator
+        scanners = [self._scanners[pose].for_other_traffic() for pose in poses]
+        shapes = body_surfaces(_bodies(run), simulator.settings.engine)
+        return Simulation(simulator.static, scanners, run.trajectories, shapes, simulator.settings)
+
+
+def detect_with_all(
+    shared: SharedScans,
+    runs: Sequence[SampledRun],
+    detector: Detector,
+    folder: Path,
+    *,
+    placements: Sequence[int] | None = None,
+    instants: slice = slice(None),
+) -> Generator[Progress, None, list[list[FrameResult]]]:
+    """Detect road users in frames of some runs with each placement; return the frames' results by placement.
+
+    What was detected in a run with a placement is kept in a folder, under a digest of all that it follows from, so that
+    work that was stopped goes on, and what other work has detected before is read. Densities and points of detections
+    are those of the foreground.
+
+    Parameters
+    ----------
+    placements : sequence of int, optional
+        Numbers of the placements; by default all.
+    instants : slice
+        Of the frames of each run.
+    """
+    chosen = range(len(shared.placements)) if placements is None else placements
+    sampled = [(run, numbers) for run in runs if (numbers := range(len(run.times))[instants])]
+    paths = [{one: _path(folder, shared, run, numbers, one, detector) for one in chosen} for run, numbers in sampled]
+    missing = [{one: path for one, path in files.items() if not path.exists()} for files in paths]
+    if any(missing):
+        yield from shared.cast(runs[0])
+        works = [
+            _detect_in_run(shared, run, numbers, files, detector)
+            for (run, numbers), files in zip(sampled, missing, strict=True)
+            if files
+        ]
+        with deterministic(1):  # all the time, as torch keeps one such setting for all threads
+            yield from side_by_side(works, AT_ONCE if detector.device.type == "cpu" else 1)
+    return [[frame for files in paths for frame in load_frames(files[one])] for one in chosen]
+
+
+def _path(
+    folder: Path, shared: SharedScans, run: SampledRun, numbers: Sequence[int], placement: int, detector: Detector
+) -> Path:
+    """Return the file of what is detected in frames of a run with a placement."""
+    scans = frames_key(shared.simulator, shared.placements[placement], [run])
+    key = digest(source_digest(__name__), scans, str(list(numbers)), detector.key)
+    return folder / FOLDER / f"{key[:32]}.npz"
+
+
+def _detect_in_run(
+    shared: SharedScans, run: SampledRun, numbers: Sequence[int], files: Mapping[int, Path], detector: Detector
+) -> Generator[Progress, None, None]:
+    """Detect road users in frames of a run with the placements that have a file, and write the files."""
+    found: dict[int, list[FrameResult]] = {placement: [] for placement in files}
+    total = len(numbers) * len(files)
+    for done, (placement, frame) in enumerate(shared.frames(run, numbers, list(files))):
+        yield Progress(done, total, f"detect in {run.name}")
+        found[placement].append(_detected(shared, shared.placements[placement], run, frame, detector))
+    for placement, path in files.items():
+        save_frames(path, found[placement])
+    yield Progress(total, total, f"detect in {run.name}")
+
+
+def _detected(
+    shared: SharedScans, placement: MountedSensors, run: SampledRun, frame: Frame, detector: Detector
+) -> FrameResult:
+    with deterministic(1):
+        found = detect(detector, shared.simulator.area(detector.settings.pillar), frame)
+    return frame_result(
+        some_points(frame, frame.foreground),
+        found,
+        region=shared.simulator.static.region,
+        sensors=placement.places,
+        run=run.name,
+        parked=run.parked,
+    )
+
+
+def _bodies(run: SampledRun) -> list[Body]:
+    return [fitted_body(user) for user in run.trajectories.users]
+
+
+def _key(sensor: MountedSensor) -> tuple[object, ...]:
+    return (sensor.model.key, *sensor.xyz.tolist(), *sensor.orientation.ravel().tolist())
