@@ -27,7 +27,7 @@ import bpy
 
 from seip_addon.core.choosing.placement.deployment import price_text
 from seip_addon.core.choosing.placement.objective import Objective, Solution, check_objective
-from seip_addon.core.choosing.placement.returns_summary import share_reached
+from seip_addon.core.choosing.placement.returns_summary import NOT_BY_DETECTION, share_reached
 from seip_addon.core.choosing.placement.scenarios import ScenarioKind, Scenarios
 from seip_addon.core.errors import SeipError
 from seip_addon.core.limits import CHOSEN_WEIGHT
@@ -152,7 +152,8 @@ def _describe(solution: Solution) -> str:
         for sensor in deployment.sensors
     ]
     central = "" if deployment.central is None else f", central {deployment.central:.2%}"
-    lines += [] if deployment.returns is None else [deployment.returns.describe()]
+    if deployment.returns is not None:
+        lines += [deployment.returns.verdict(), deployment.returns.describe()]
     lines += [] if solution.evaluation is None else solution.evaluation.summary()
     price = price_text(deployment.price, installed=deployment.installed)
     lines.append(f"coverage {deployment.coverage:.2%}{central}, price {price}")
@@ -163,6 +164,8 @@ def _describe(solution: Solution) -> str:
         lines.append(
             f"the greedy algorithm reaches {reached:.2%} of {'those returns' if of_returns else 'that objective'}"
         )
+    if deployment.returns is not None and solution.judgement is None:
+        lines.append(NOT_BY_DETECTION)
     return "\n".join([*lines, *solution.notes])
 
 

@@ -12,7 +12,14 @@ import numpy as np
 from ...arrays import Boolean, Float
 from ...choosing.placement.deployment import BAND, UNRANKED
 from ...choosing.placement.objective import CHOSEN_FOR, MOVED, SAME_PRICE, purpose
-from ...choosing.placement.returns_summary import FEW, FEW_RETURNS, SURFACE_SEEN, ReturnsSummary, returns_text
+from ...choosing.placement.returns_summary import (
+    FEW,
+    FEW_RETURNS,
+    NOT_BY_DETECTION,
+    SURFACE_SEEN,
+    ReturnsSummary,
+    returns_text,
+)
 from ...counts import counted
 from ...site.candidates import PAPER_TYPES
 from ..pictures.drawing import percent
@@ -460,7 +467,9 @@ def _other_choices(evidence: Evidence) -> Iterator[Block]:
     notes = [sentence(note) for note in record.notes if not note.startswith(elsewhere)]
     notes += [same_price] if same_price else []
     notes += [] if record.judgement is None else record.judgement.sentences()
-    notes.append("“Proven” refers to the model: this scene, these sensor models and this definition of seen.")
+    if record.returns is not None and record.judgement is None:
+        notes.append(sentence(NOT_BY_DETECTION))
+    notes.append("“Proven” refers to the model: this scene, these sensor models and this criterion.")
     yield Bullets(tuple(notes))
     if record.returns is not None and record.returns.front:
         yield from _returns_front(record, record.returns)
