@@ -13,20 +13,18 @@ from dataclasses import asdict
 from pathlib import Path
 
 from headless import runtime, survey
-from headless.options import add_settings, add_weather, new_parser, whole_number
+from headless.options import add_settings, add_weather, new_parser
 
 import bpy
 
 from seip_addon.core.choosing.placement.judgement import MEAN, Judgement
 from seip_addon.core.choosing.placement.objective import Objective, Solution
 from seip_addon.core.errors import SeipError
-from seip_addon.core.limits import Limits
 from seip_addon.core.sensing.lidar.catalogue import find_models, load_catalogue
 from seip_addon.core.sensing.weather import weather_of
 from seip_addon.core.storage.files import save_json
 from seip_addon.core.sumo_programs import NETWORK_SUFFIX, find_sumo
 from seip_addon.core.workflows.finalists import (
-    DEFAULT_FINALISTS,
     JudgementRequest,
     check_judged,
     find_finalists,
@@ -45,34 +43,8 @@ TRAFFIC = "traffic"
 """Folder of these in the folder of results."""
 
 
-def add_finalists(parser: argparse.ArgumentParser) -> None:
-    """Add the options of finalists to a command."""
-    group = parser.add_argument_group("finalists")
-    group.add_argument(
-        "--finalists",
-        nargs="?",
-        const=DEFAULT_FINALISTS,
-        type=whole_number(Limits(2, 100)),
-        metavar="N",
-        help=f"choose among so many placements ({DEFAULT_FINALISTS}) by what the shipped detector finds with them in "
-        "traffic; needs PyTorch",
-    )
-    group.add_argument(
-        "--judge-on",
-        nargs="+",
-        type=Path,
-        metavar="NPZ",
-        help="runs of traffic: the first half for the choice, the others for its figures (default: those in the folder "
-        "SCENE_traffic beside the scene, else runs that SUMO simulates)",
-    )
-
-
 def check_finalists(options: argparse.Namespace, objective: Objective) -> None:
     """Raise SeipError, or end the command, if finalists cannot be judged; before anything takes time."""
-    if options.finalists is None:
-        if options.judge_on:
-            raise SeipError("--judge-on names the traffic in which finalists are judged: add --finalists")
-        return
     check_judged(objective)
     importlib.import_module("headless.detection")  # ends the command where there is no PyTorch
     if not _known_runs(options):

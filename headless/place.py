@@ -10,6 +10,7 @@ or as plain Python on the bpy module::
 """
 
 import argparse
+import importlib
 import math
 import sys
 from dataclasses import replace
@@ -20,17 +21,17 @@ if not __package__:  # run as a file by `blender -P`
 
 from headless import runtime, survey
 from headless.charts.robustness import save_evaluation_charts
-from headless.finalists import add_finalists, check_finalists, judge
-from headless.options import add_settings, new_parser, read_settings, real_number
+from headless.options import add_settings, new_parser, read_settings, real_number, whole_number
 
 import bpy
 
 from seip_addon.core.choosing.placement.deployment import price_text
+from seip_addon.core.choosing.placement.judgement import DEFAULT_FINALISTS
 from seip_addon.core.choosing.placement.objective import Objective, Solution, check_objective
 from seip_addon.core.choosing.placement.returns_summary import NOT_BY_DETECTION, share_reached
 from seip_addon.core.choosing.placement.scenarios import ScenarioKind, Scenarios
 from seip_addon.core.errors import SeipError
-from seip_addon.core.limits import CHOSEN_WEIGHT
+from seip_addon.core.limits import CHOSEN_WEIGHT, Limits
 from seip_addon.core.progress import finish
 from seip_addon.core.sensing.scenarios.pose_errors import PoseErrors
 from seip_addon.core.workflows.placing import place, with_context
@@ -116,7 +117,11 @@ def main(argv: list[str]) -> None:
     """Place sensors in a scene and write the result to a folder."""
     options = _parser().parse_args(argv)
     objective = read_objective(options)
-    check_finalists(options, objective)
+    finalists = None if options.finalists is None else importlib.import_module("headless.finalists")  # needs PyTorch
+    if finalists is not None:
+        finalists.check_finalists(options, objective)
+    elif options.judge_on:
+        raise SeipError("--judge-on names the traffic in which finalists are judged: add --finalists")
     if options.require == []:
         runtime.open_scene(options.scene)
         objective = replace(objective, mandatory=tuple(sensor_positions(bpy.context.scene)))
@@ -133,11 +138,11 @@ def main(argv: list[str]) -> None:
         runtime.LOG.info(runs.overlap)
     acceptance = runtime.accepted_by_enter()
     solution = watch.run("placement", place(surveyed, objective, runs, acceptance))
-    if options.finalists is None:
+    if finalists is None:
         runtime.print_line(_describe(solution))
     solution = watch.run("fewer and more sensors", with_context(surveyed, solution, acceptance))
-    if options.finalists is not None:
-        solution = judge(surveyed, watch, solution, options)
+    if finalists is not None:
+        solution = finalists.judge(surveyed, watch, solution, options)
         runtime.print_line(_describe(solution))
     with runtime.incomplete_if_interrupted(options.output):
         save_evaluation_charts(options.output, surveyed, solution)
@@ -169,11 +174,33 @@ def _describe(solution: Solution) -> str:
     return "\n".join([*lines, *solution.notes])
 
 
+def _add_finalists(parser: argparse.ArgumentParser) -> None:
+    """Add the options of finalists."""
+    group = parser.add_argument_group("finalists")
+    group.add_argument(
+        "--finalists",
+        nargs="?",
+        const=DEFAULT_FINALISTS,
+        type=whole_number(Limits(2, 100)),
+        metavar="N",
+        help=f"choose among this number of placements ({DEFAULT_FINALISTS}) by what the shipped detector finds with "
+        "them in traffic; needs PyTorch",
+    )
+    group.add_argument(
+        "--judge-on",
+        nargs="+",
+        type=Path,
+        metavar="NPZ",
+        help="runs of traffic: the first half for the choice, the others for its figures (default: those in the folder "
+        "SCENE_traffic beside the scene, else runs that SUMO simulates)",
+    )
+
+
 def _parser() -> argparse.ArgumentParser:
     parser = new_parser("place", "Place roadside LiDARs in a scene.")
     survey.add_options(parser)
     add_objective(parser)
-    add_finalists(parser)
+    _add_finalists(parser)
     parser.add_argument("--no-render", action="store_true", help="leave out the rendered view")
     return parser
 

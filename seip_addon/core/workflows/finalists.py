@@ -15,7 +15,7 @@ from typing import TypeVar
 import numpy as np
 
 from ..arrays import Boolean, Integer
-from ..choosing.placement.judgement import Judgement
+from ..choosing.placement.judgement import DEFAULT_FINALISTS, Judgement
 from ..choosing.placement.objective import Objective, Solution, criterion_of, placement_problem
 from ..choosing.placement.problem import TIE_TOLERANCE, PlacementProblem, assess
 from ..choosing.placement.search_limits import SolverLimits
@@ -31,7 +31,6 @@ from .detection import DetectionJob, run_elsewhere
 from .returns import crossing_returns, survey_returns
 from .survey import Survey, surroundings
 
-DEFAULT_FINALISTS = 12
 FINALIST_EFFORT = 0.5
 """Largest effort of the search for the best placement by each criterion: its proof is of no use here."""
 LONE_HEIGHTS = 3

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from ...counts import counted
 from ...estimates import Interval
 
+DEFAULT_FINALISTS = 12
 MEAN = "mean"
 """Name of the weighted mean over the classes of road users."""
 
