@@ -108,7 +108,8 @@ def _like(key: str, table: Any, file: str, known: Mapping[str, LidarModel]) -> L
         gains = tuple(values["gain_band"] or (CALIBRATED if calibration else model.gains))
         unit = model.amplified(values["gain"])
         name, calibration = values["name"] or model.name, calibration or model.calibration
-        return replace(unit, key=key, name=name, calibration=calibration, gains=gains)
+        assumed = "" if calibration else model.assumed_law
+        return replace(unit, key=key, name=name, calibration=calibration, assumed_law=assumed, gains=gains)
     except SeipError as error:
         raise SeipError(f"{where}: {error}") from error
 
@@ -151,7 +152,7 @@ def _model(key: str, table: Any, file: str) -> LidarModel:  # noqa: ANN401 - wha
             price_range=price_range,
             law=law,
             assumed_beams=beams,
-            assumed_law=assumed,
+            assumed_law="" if calibration else assumed,
             calibration=calibration,
             gains=tuple(gains or (CALIBRATED if calibration else likely)),
             field_of_view=field_of_view,

@@ -43,6 +43,7 @@ def test_every_sensor_says_what_its_detection_rests_on():
         assert model.evidence
         if model.manufacturer == "generic" or model.calibration:
             assert (low, high) == (1.0, 1.0)
+            assert not model.assumed_law
         else:
             assert low < 1.0 < high
             assert "data sheet" in model.evidence
