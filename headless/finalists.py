@@ -21,6 +21,7 @@ from seip_addon.core.choosing.placement.judgement import MEAN, Judgement
 from seip_addon.core.choosing.placement.objective import Objective, Solution
 from seip_addon.core.errors import SeipError
 from seip_addon.core.sensing.lidar.catalogue import find_models, load_catalogue
+from seip_addon.core.sensing.traffic.trajectories import Trajectories
 from seip_addon.core.sensing.weather import weather_of
 from seip_addon.core.storage.files import save_json
 from seip_addon.core.sumo_programs import NETWORK_SUFFIX, find_sumo
@@ -47,6 +48,8 @@ def check_finalists(options: argparse.Namespace, objective: Objective) -> None:
     """Raise SeipError, or end the command, if finalists cannot be judged; before anything takes time."""
     check_judged(objective)
     importlib.import_module("headless.detection")  # ends the command where there is no PyTorch
+    for path in options.judge_on or ():
+        Trajectories.load(path)  # raises an error for a file that cannot be read
     if not _known_runs(options):
         _map_of(options.scene)
 

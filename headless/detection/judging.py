@@ -117,7 +117,7 @@ def judge_finalists(
     paths : sequence of path
         Runs of traffic.
     folder : path
-        What was detected is kept in it.
+        Folder for detections, which later judgements use again.
 
     Raises
     ------

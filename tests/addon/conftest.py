@@ -1,5 +1,7 @@
 """The add-on as Blender registers it, on a fresh file, with a cache of its own."""
 
+from types import SimpleNamespace
+
 import bpy
 import pytest
 
@@ -33,3 +35,15 @@ def junction(add_on, small_scene):
     for one in scene.seip.survey.types:
         one.use = one.name == "type1"
     return scene
+
+
+@pytest.fixture
+def online(monkeypatch):
+    """Let the preferences find that Blender may go online, and return a function that changes this."""
+
+    def allow(allowed):
+        app = SimpleNamespace(online_access=allowed, python_args=(), background=True)
+        monkeypatch.setattr(preferences, "bpy", SimpleNamespace(**{**vars(bpy), "app": app}))
+
+    allow(True)
+    return allow

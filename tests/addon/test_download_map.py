@@ -26,16 +26,6 @@ def scene(add_on):
 
 
 @pytest.fixture
-def online(monkeypatch):
-    def allow(allowed):
-        app = SimpleNamespace(online_access=allowed, python_args=(), background=True)
-        monkeypatch.setattr(preferences, "bpy", SimpleNamespace(**{**vars(bpy), "app": app}))
-
-    allow(True)
-    return allow
-
-
-@pytest.fixture
 def stand_in(monkeypatch, tmp_path, online):
     """A server that is named in the preferences."""
     monkeypatch.delenv("http_proxy", raising=False)

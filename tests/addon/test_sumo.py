@@ -24,18 +24,6 @@ def scene(add_on):
 
 
 @pytest.fixture
-def online(monkeypatch):
-    """Let Blender go online or not; pip takes the wheels of a folder instead of the internet."""
-
-    def allow(allowed):
-        app = SimpleNamespace(online_access=allowed, python_args=(), background=True)
-        monkeypatch.setattr(preferences, "bpy", SimpleNamespace(**{**vars(bpy), "app": app}))
-
-    allow(True)
-    return allow
-
-
-@pytest.fixture
 def machine(tmp_path, monkeypatch, online):
     """A machine without SUMO, whose pip has a stand-in, and an extension with an empty folder of its own."""
     monkeypatch.setenv("PATH", "/usr/bin:/bin")

@@ -152,7 +152,7 @@ def judge_elsewhere(
     scene : path
         A .blend in a folder for temporary files.
     folder : path
-        What was detected is kept in it.
+        Folder for detections, which later judgements use again.
 
     Raises
     ------
@@ -172,7 +172,7 @@ def read_answer(kind: type[Content], path: Path) -> Content:
     Raises
     ------
     SeipError
-        It is none.
+        The file is damaged or missing.
     """
     try:
         return from_json(kind, json.loads(path.read_text(encoding="utf-8")))
