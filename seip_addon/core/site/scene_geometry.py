@@ -113,14 +113,20 @@ class NamedArea:
     ----------
     weight : float
         Weight of the targets in a weighted region.
-    crossing : bool
-        Whether a place of the map is a pedestrian crossing.
+    crossing, track : bool
+        Whether a place of the map is a pedestrian crossing, or a track of trams or trains beside the streets.
     """
 
     name: str
     polygon: BaseGeometry
     weight: float = 1.0
     crossing: bool = False
+    track: bool = False
+
+    @property
+    def street(self) -> bool:
+        """Whether a place of the map is a street."""
+        return not (self.crossing or self.track)
 
 
 @dataclass(frozen=True, eq=False)

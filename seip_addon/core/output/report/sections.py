@@ -395,7 +395,7 @@ def _places(evidence: Evidence) -> Iterator[Block]:
     site, returns = evidence.site, {one.name: one.least for one in record.crossings}
     parts = seen_streets(site.targets, evidence.seen_by, [one for one in site.areas if one.name not in returns])
     streets = ((one.name, f"{one.area:,.0f}", percent(one.seen), percent(one.seen_twice)) for one in parts)
-    yield Table(("Street", "Area, m²", "Seen", "Twice"), tuple(streets), frozenset({1, 2, 3}))
+    yield Table(("Part of the road", "Area, m²", "Seen", "Twice"), tuple(streets), frozenset({1, 2, 3}))
     places = seen_places(site.targets, evidence.seen_by, [one for one in site.areas if one.name in returns])
     crossings = tuple((one.name, percent(one.seen), returns_text(returns[one.name])) for one in places)
     if crossings:
