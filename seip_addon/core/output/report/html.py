@@ -49,7 +49,9 @@ code { display: block; background: #eef1f3; padding: .6em .8em; overflow-wrap: a
 }
 @media print {
   body { font-size: 9.5pt; margin: 0; max-width: none; padding: 0; }
-  figure > img { max-height: 21cm; }
+  figure > img { max-height: 14cm; }
+  figure.tall > img { max-height: 21cm; }
+  dl { break-inside: avoid; }
   header figure > img { max-height: 11cm; }
   section:first-of-type { break-before: page; }
 }
@@ -109,7 +111,9 @@ def _facts(facts: Facts) -> str:
 
 def _figure(block: Picture | Pictures) -> str:
     if isinstance(block, Picture):
-        return f"<figure>{_image(block.png, block.caption)}<figcaption>{escape(block.caption)}</figcaption></figure>"
+        kind = ' class="tall"' if block.tall else ""
+        caption = f"<figcaption>{escape(block.caption)}</figcaption>"
+        return f"<figure{kind}>{_image(block.png, block.caption)}{caption}</figure>"
     images = "".join(_image(png, block.about) for png in block.pngs)
     return f'<figure><div class="pair">{images}</div></figure>'
 
