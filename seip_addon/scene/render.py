@@ -80,8 +80,8 @@ class Shot:
         """Return what `as_json` wrote down."""
         views, reach, sensors, points, (width, height), slack = value
         viewpoints = tuple(Viewpoint(*(np.array(array) for array in view)) for view in views)
-        placed = (np.array(xyz, dtype=np.float64).reshape(-1, 3) for xyz in (sensors, points))
-        return cls(viewpoints, reach, *placed, (width, height), slack)
+        sensors, points = (np.array(xyz, dtype=np.float64).reshape(-1, 3) for xyz in (sensors, points))
+        return cls(viewpoints, reach, sensors, points, (width, height), slack)
 
 
 @dataclass(frozen=True, eq=False)

@@ -48,15 +48,18 @@ from .evidence import Evidence
 from .figures import blind_spot_map, front_chart
 from .repeat import repeating_command
 from .wording import (
+    altitude_zero,
     date,
     dollars,
     geographic,
     in_sentence,
     limits_of,
     mounting,
+    named,
     plain_warning,
     points,
     proof,
+    returns_within,
 )
 
 
@@ -100,6 +103,7 @@ def failures(seen: Boolean) -> Failures | None:
 MOST_SPOTS = 8
 LEAST_TILT = 0.05  # degrees, below which a sensor is upright
 MIN_DIFFERENCE = 1e-6  # share of the road by which two coverages differ at least; records have nine digits
+FOR_RETURNS = " for returns from road users"
 POSE_ERRORS = "with errors of"
 """How the note begins that says what pose errors cost."""
 CAPTIONS = {
@@ -209,14 +213,15 @@ def _summary(evidence: Evidence) -> str:
         parts += filter(None, [record.returns.verdict()])
         of_each = record.returns.of_each
         named = [f"{returns_text(number)} points on a {name}" for name, number in of_each.items()]
+        measure = "it typically measures" if len(record.sensors) == 1 else "they typically measure"
         parts.append(
-            f"In each revolution they typically measure {', '.join(named[:-1])} and {named[-1]}, with an allowance "
-            "for traffic in between."
+            f"In each revolution {measure} {', '.join(named[:-1])} and {named[-1]}, with an allowance for traffic in "
+            "between."
         )
     least = min(record.crossings, key=lambda one: one.least, default=None)
     if least is not None:
         parts.append(
-            f"A pedestrian in plain view on a crossing receives at least {returns_text(least.least)} points in each "
+            f"A pedestrian in plain view on a crossing returns at least {returns_text(least.least)} points in each "
             f"revolution (at the worst point of the {in_sentence(least.name)})."
         )
     failed = failures(evidence.site.seen)
@@ -324,8 +329,8 @@ def _sensors(evidence: Evidence, costs: Costs) -> Iterator[Block]:
     system = (
         f"There are no latitudes and longitudes: {obstacle}."
         if obstacle
-        else f"Eastings and northings are coordinates of the projection “{_projection(evidence)}”; latitudes and "
-        "longitudes are on WGS 84."
+        else f"Eastings and northings are coordinates of {_projection(evidence)}; latitudes and longitudes are on "
+        f"WGS 84; altitudes count from {altitude_zero(evidence)}."
     )
     yield Paragraph(
         "Heights and coordinates are those of the optical centre. On the plans north is up, and small circles are "
@@ -355,7 +360,7 @@ def _sensor_facts(evidence: Evidence, sensor: RecordedSensor, items: Mapping[str
     yield from _coordinates(sensor)
     parts = ", ".join(f"{name} {dollars(amount)}" for name, amount in items.items())
     yield "Cost", f"{dollars(sum(items.values()))}: {parts}"
-    alone = f"; {percent(sensor.coverage_marginal)} no other sensor sees" if len(evidence.sensors) > 1 else ""
+    alone = f"; {percent(sensor.coverage_marginal)} is seen by no other" if len(evidence.sensors) > 1 else ""
     yield "Sees", f"{percent(sensor.coverage_alone)} of the road{alone}"
 
 
@@ -368,12 +373,13 @@ def _coordinates(sensor: RecordedSensor) -> Iterator[tuple[str, str]]:
     if sensor.latitude_deg is not None and sensor.longitude_deg is not None:
         yield "Latitude, longitude", f"{sensor.latitude_deg:.6f}°, {sensor.longitude_deg:.6f}°"
     if sensor.altitude_m is not None:
-        yield "Altitude", f"{sensor.altitude_m:.1f} m above the zero of the map's heights"
+        yield "Altitude", f"{sensor.altitude_m:.1f} m"
 
 
 def _projection(evidence: Evidence) -> str:
-    known = evidence.record.site.geo_reference
-    return "" if known is None else known.projection
+    mercator = evidence.geo_reference.mercator
+    zone = "" if mercator is None else mercator.zone
+    return f"UTM zone {zone}" if zone else f"the projection “{evidence.geo_reference.projection}”"
 
 
 def _costs(costs: Costs) -> Iterator[Block]:
@@ -464,17 +470,17 @@ def _other_choices(evidence: Evidence) -> Iterator[Block]:
     yield Paragraph(proof(evidence))
     same_price = _same_price(evidence)
     elsewhere = (POSE_ERRORS, CHOSEN_FOR, BAND, UNRANKED, FEW, *LOCATED_FILES, *([SAME_PRICE] if same_price else []))
-    notes = [sentence(note) for note in record.notes if not note.startswith(elsewhere)]
+    notes = [sentence(note.partition(": the gap is")[0]) for note in record.notes if not note.startswith(elsewhere)]
     notes += [same_price] if same_price else []
     notes += [] if record.judgement is None else record.judgement.sentences()
     if record.returns is not None and record.judgement is None:
         notes.append(sentence(NOT_BY_DETECTION))
     notes.append("“Proven” refers to the model: this scene, these sensor models and this criterion.")
     yield Bullets(tuple(notes))
-    if record.returns is not None and record.returns.front:
-        yield from _returns_front(record, record.returns)
-    elif record.front:
+    if record.returns is None and len(record.front) > 1:
         yield from _front(evidence)
+    elif record.returns is not None and len(record.returns.front) > 1:
+        yield from _returns_front(record, record.returns)
 
 
 def _same_price(evidence: Evidence) -> str:
@@ -533,8 +539,8 @@ def _returns_front(record: PlacementRecord, returns: ReturnsSummary) -> Iterator
     charted = [(one.count, one.returns, (1.0 + one.returns) * (one.gap or 0.0)) for one in returns.front]
     yield Paragraph(
         "With fewer or more sensors under the same rules, regardless of price, the best choices found by a short "
-        "search typically measure these numbers of points on a road user in each revolution; shares in the last "
-        f"column are of 1 + points.{_without_budget(record)}"
+        "search typically measure these numbers of points on a road user in each revolution."
+        f"{_without_budget(record)}"
     )
     yield Picture(
         front_chart(
@@ -548,17 +554,17 @@ def _returns_front(record: PlacementRecord, returns: ReturnsSummary) -> Iterator
         "what no choice can exceed.",
     )
     rows = tuple(
-        (str(point.count), f"{point.price:,.0f}", returns_text(point.returns), _others_have(point.gap))
+        (str(point.count), f"{point.price:,.0f}", returns_text(point.returns), _others_have(point.returns, point.gap))
         for point in returns.front
     )
     yield Table(("Sensors", _price_head(record), "Points", "Other choices"), rows, frozenset({0, 1, 2}))
 
 
-def _others_have(gap: float | None) -> str:
-    """Return how many more returns other choices of a number of sensors can have, as text."""
+def _others_have(returns: float, gap: float | None) -> str:
+    """Return how many returns other choices of a number of sensors can have, as text."""
     if gap is None:
         return "may have more"
-    return f"at most {math.ceil(gap * 1000 - 1e-9) / 10:.1f}% more" if gap else "none has more"
+    return f"none has more than {returns_within(returns, gap)}" if gap else "none has more"
 
 
 def _without_budget(record: PlacementRecord) -> str:
@@ -567,18 +573,17 @@ def _without_budget(record: PlacementRecord) -> str:
 
 
 def _price_head(record: PlacementRecord) -> str:
-    return "Installed, $" if record.installed else "Sensors, $"
+    return "Price installed, $" if record.installed else "Price, $"
 
 
 def _losses(evidence: Evidence) -> Iterator[Block]:
     record = evidence.record
     failed = failures(evidence.site.seen)
-    if failed is not None:
+    if failed is not None and len(record.sensors) > 1:
         worst = record.sensors[failed.left.index(failed.worst)].id
-        yield Paragraph(
-            f"After the failure of one sensor, {percent(failed.mean)} of the road is still seen on average, and "
-            f"{percent(failed.worst)} in the worst case, the failure of {worst}."
-        )
+        seen, least = percent(failed.mean), percent(failed.worst)
+        worse = f" on average, and {least} in the worst case, the failure of {worst}" if seen != least else ""
+        yield Paragraph(f"After the failure of one sensor, {seen} of the road is still seen{worse}.")
         yield Table(
             ("Failed", "Still seen", "Lost"),
             tuple(
@@ -611,7 +616,7 @@ def _trust(evidence: Evidence) -> Iterator[Block]:
         lines.append(f"Types 1 to 3 {PAPER_MODELS} This placement uses {' and '.join(models)}.")
     evidences = {sensor.sensor_name: sensor.evidence for sensor in record.sensors if sensor.sensor not in PAPER_TYPES}
     lines += [f"Range of {name}: {rests_on}." for name, rests_on in evidences.items() if rests_on]
-    lines += [sentence(note) for note in record.notes if note.startswith((BAND, UNRANKED))]
+    lines += [named(sentence(note)) for note in record.notes if note.startswith((BAND, UNRANKED))]
     chosen = (sensor.sensor for sensor in record.sensors)
     warnings = relevant_warnings(record.warnings, record.request.candidates.sensors, chosen)
     lines += [plain_warning(warning, names) for warning in warnings]
@@ -635,7 +640,9 @@ def _sources(evidence: Evidence) -> Iterator[Block]:
     lines.append(f"Program: SEIP for Blender {version}, GPL-3.0-or-later.".replace("  ", " "))
     yield Bullets(tuple(lines))
     if record.site.sources:
-        yield Paragraph("Where the objects of the scene come from, and for how many position or size is assumed:")
+        yield Paragraph(
+            "Where the objects of the scene come from, and for how many of them position or size is assumed:"
+        )
         rows = tuple(
             (row.kind, row.source, f"{row.count:,}", f"{row.assumed:,}" if row.assumed else "none")
             for row in record.site.sources
@@ -667,6 +674,7 @@ def _settings(evidence: Evidence) -> Iterator[tuple[str, str]]:
         what = "most of the road seen" if record.returns is None else "most points on road users"
         asked = f"{what}{limits_of(goal, 'with')}"
     chosen_for = purpose(record.notes)
+    chosen_for = "" if record.returns is not None and chosen_for == FOR_RETURNS else chosen_for
     yield "Asked for", f"{asked}{f', chosen{chosen_for}' if chosen_for else ''}"
     rules = ["the road in weighted regions counts more"] if goal.central_weight is not None else []
     rules += [f"sensors at least {goal.min_distance:g} m apart"] if goal.min_distance > 0 else []

@@ -8,11 +8,17 @@ from collections.abc import Mapping
 from datetime import datetime
 
 from ...choosing.placement.objective import CHOSEN_FOR, MOVED, MOVED_MESSAGE, Objective, certificate
+from ...choosing.placement.returns_summary import returns_text
 from ...counts import counted
-from ..results.answer import sentence
+from ...sensing.lidar.catalogue import load_catalogue
+from ...site.scene_geometry import FROM_EXTRACT
+from ...site.sources import HEIGHTS_FROM
+from ..results.answer import possible_improvement, sentence
 from ..results.placement_record import RecordedObjective, RecordedSensor
 from .evidence import Evidence
 
+LEVEL = 0.5  # metres between the road at the origin and zero in a model without heights
+ROADS = "Driving lanes"
 _RINGS = re.compile(r"beyond (.*?) neighbouring rings on a level road are more than 2δ = ([\d.]+) m apart.*")
 _RANGE = re.compile(r"detects this road \((.*?) reflectivity\) with (.*?) probability up to (.*?)(?:;.*)?$")
 
@@ -27,6 +33,18 @@ def points(share: float) -> str:
     return f"{math.ceil(share * 1000 - 1e-9) / 10:.1f} percentage points"
 
 
+def returns_within(returns: float, gap: float) -> str:
+    """Return a bound on returns as text, rounded up; the gap is the largest share by which 1 + returns can grow."""
+    most = (1.0 + returns) * (1.0 + gap) - 1.0
+    return f"{math.ceil(most - 1e-9):,}" if most >= 10 else f"{math.ceil(10 * most - 1e-9) / 10:.1f}"
+
+
+def named(text: str) -> str:
+    """Return a text with the names of sensor types in place of their catalogue keys."""
+    catalogue = load_catalogue()
+    return re.sub(r"\w+", lambda word: catalogue[word[0]].name if word[0] in catalogue else word[0], text)
+
+
 def date(created: str) -> str:
     """Return the date of a time (ISO 8601), such as 24 November 2026."""
     when = datetime.fromisoformat(created)
@@ -38,6 +56,19 @@ def geographic(latitude: float, longitude: float, digits: int) -> str:
     """Return latitude and longitude in degrees with their hemispheres."""
     north, east = "N" if latitude >= 0 else "S", "E" if longitude >= 0 else "W"
     return f"{abs(latitude):.{digits}f}° {north}, {abs(longitude):.{digits}f}° {east}"
+
+
+def altitude_zero(evidence: Evidence) -> str:
+    """Return the level that altitudes count from, as far as the scene knows it."""
+    site = evidence.record.site
+    file = next((note.removeprefix(HEIGHTS_FROM) for note in site.assumptions if note.startswith(HEIGHTS_FROM)), "")
+    if file:
+        return f"the zero of the heights in {file.rpartition(' to ')[0].rpartition(', ')[0]}"
+    from_extract = any(row.source == FROM_EXTRACT and row.kind == ROADS for row in site.sources)
+    if from_extract and abs(site.origin_m[2]) < LEVEL:
+        return "the ground of the model, which is level, as the extract has no heights above the sea"
+    model = re.search(r"\+geoidgrids=(\S+)", evidence.geo_reference.projection)
+    return f"the zero of the map's heights{f' (geoid {model[1]})' if model else ', whose level the map does not give'}"
 
 
 def in_sentence(name: str) -> str:
@@ -96,8 +127,20 @@ def proof(evidence: Evidence) -> str:
     choice = f"choice{limits_of(record.request.goal, 'of')} among the {record.counts.positions:,} possible positions"
     if found.status == "optimal":
         return f"No other {choice} does better: this is proven."
-    better = "how much better is not known" if found.gap is None else f"by at most {found.gap:.1%}: this is proven"
-    return f"Another {choice} may do better, {better}."
+    if found.gap is None:
+        return f"Another {choice} may do better; how much better is not known."
+    returns, more = record.returns, possible_improvement(record)
+    if (
+        returns is not None
+        and more is not None
+        and math.isclose(math.expm1(found.value), returns.typical, rel_tol=1e-3)
+    ):
+        typical, most = returns_text(returns.typical), returns_within(returns.typical, more)
+        return (
+            f"Another {choice} may have more than {typical} points on a typical road user, but not more than {most}: "
+            "this bound is proven."
+        )
+    return f"Another {choice} may do better, by at most {math.ceil(found.gap * 1000 - 1e-9) / 10:.1f}%: this is proven."
 
 
 def limits_of(goal: Objective, joint: str) -> str:

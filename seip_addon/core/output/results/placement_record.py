@@ -61,7 +61,7 @@ def relevant_warnings(warnings: Iterable[str], considered: Iterable[str], chosen
 
 @dataclass(frozen=True)
 class RecordedGeoReference:
-    """Georeference of the scene's map; see `GeoReference`."""
+    """Georeference of the scene's map; UTM zones are those of its hemisphere, see `GeoReference.in_hemisphere`."""
 
     projection: str
     header_offset_m: MapPoint
@@ -112,7 +112,7 @@ class RecordedSensor:
     latitude_deg, longitude_deg, altitude_m : float, optional
         On WGS 84, and the height above the map's zero; None where the map's projection is not known.
     easting_m, northing_m : float, optional
-        Coordinates of the map's projection: map coordinates and the offset of the map's header. None likewise.
+        Coordinates of the record's projection: map coordinates and the offset of its header. None likewise.
     evidence : str
         What its type's law of detection rests on; records of earlier versions lack it.
     installation_usd : float, optional
@@ -336,7 +336,7 @@ def placement_record(
     deployment, placement, greedy = solution.deployment, solution.placement, solution.greedy
     return PlacementRecord(
         site=RecordedSite(
-            *(site.name, _metres(site.origin), _geo_reference(site.geo_reference)),
+            *(site.name, _metres(site.origin), _geo_reference(site.geo_reference.in_hemisphere(site.origin))),
             *(site.sources, site.attribution, site.assumptions),
         ),
         sensors=tuple(recorded_sensor(sensor, site) for sensor in deployment.sensors),
@@ -396,7 +396,8 @@ def recorded_sensor(sensor: Sensor, site: Site) -> RecordedSensor:
     place = site.geographic(sensor.xyz[None])
     longitude, latitude, altitude = (None, None, None) if place is None else place[0]
     map_xyz = sensor.xyz + site.origin
-    easting, northing = (None, None) if place is None else site.geo_reference.projected(map_xyz[None])[0, :2]
+    reference = site.geo_reference.in_hemisphere(site.origin)
+    easting, northing = (None, None) if place is None else reference.projected(map_xyz[None])[0, :2]
     return RecordedSensor(
         id=sensor.label,
         pose=sensor.pose,
