@@ -146,7 +146,7 @@ def _described(record: NetworkRecord, site: NetworkSite) -> str:
         return site.status
     seen = f"{percent(site.coverage)} of the road seen"
     typical = "" if record.criterion == "road" else f"{outcome(record, site.value)} typical returns, "
-    return f"{sensors_text(site.sensors)}, {dollars(site.price_usd)}, {typical}{seen}"
+    return f"{sensors_text(site.sensors, record.sensor_names)}, {dollars(site.price_usd)}, {typical}{seen}"
 
 
 def _scale(view: NetworkView) -> str:
@@ -192,7 +192,7 @@ def _row(record: NetworkRecord, one: RankedSite) -> str:
     value = percent(site.coverage) if record.criterion == "road" else outcome(record, site.value)
     figures = (value, gain_text(record, one.gain), dollars(site.price_usd)) if equipped else ("–", "–", "–")
     cells = "".join(f'<td class="number">{words}</td>' for words in figures)
-    sensors = sensors_text(site.sensors) if equipped else _described(record, site)
+    sensors = sensors_text(site.sensors, record.sensor_names) if equipped else _described(record, site)
     place = "./" + quote(site.folder, safe="/")
     files = ", ".join(
         f'<a href="{escape(f"{place}/{file}")}">{word}</a>'

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Any, Literal
 
 from ...storage.json_dataclass import as_json
@@ -109,6 +110,10 @@ class NetworkRecord:
         out.
     curve : tuple of NetworkPoint
         Value of the network for amounts of money; prices rise.
+    sensor_types : tuple of str
+        Types to choose from, by their keys in the catalogue.
+    sensor_names : mapping of str to str
+        Name of the product for each key.
     created : str
         Time of the placement (ISO 8601), "" if it is not recorded.
     goal : float, optional
@@ -127,6 +132,7 @@ class NetworkRecord:
     sites: tuple[NetworkSite, ...]
     curve: tuple[NetworkPoint, ...]
     sensor_types: tuple[str, ...]
+    sensor_names: Mapping[str, str] = field(default_factory=dict)
     attribution: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     created: str = ""

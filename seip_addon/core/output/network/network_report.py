@@ -6,7 +6,6 @@ import math
 from collections.abc import Iterator
 
 from ...counts import counted
-from ...sensing.lidar.catalogue import load_catalogue
 from ..pictures.drawing import percent
 from ..report.blocks import Block, Bullets, Facts, Paragraph, Picture, Report, Section, Table
 from ..report.wording import date, dollars
@@ -45,8 +44,7 @@ def _key_figures(record: NetworkRecord) -> Iterator[tuple[str, str]]:
     failed = f", {count['failed']:,} failed" if count["failed"] else ""
     yield "Sites", f"{count['equipped']:,} of {len(record.sites):,} have sensors{failed}"
     sensors = [sensor for site in record.sites for sensor in site.sensors]
-    names = {key: model.name for key, model in load_catalogue().items()}
-    yield "Sensors", f"{len(sensors):,}: {sensors_text(sensors, names)}" if sensors else "none"
+    yield "Sensors", f"{len(sensors):,}: {sensors_text(sensors, record.sensor_names)}" if sensors else "none"
     yield "Money", f"{dollars(record.price_usd)} of a budget of {dollars(record.budget_usd)}"
     yield "Quality", _quality(record)
     if count["failed"] < len(record.sites):
@@ -89,8 +87,8 @@ def _equipped(record: NetworkRecord, ranked: tuple[RankedSite, ...]) -> Iterator
     figure = "Road seen" if record.criterion == "road" else "Returns"
     rows = tuple(
         (
-            *(str(one.rank or "–"), one.site.name, sensors_text(one.site.sensors), dollars(one.site.price_usd)),
-            *(_result(record, one), gain_text(record, one.gain)),
+            *(str(one.rank or "–"), one.site.name, sensors_text(one.site.sensors, record.sensor_names)),
+            *(dollars(one.site.price_usd), _result(record, one), gain_text(record, one.gain)),
         )
         for one in equipped
     )

@@ -62,7 +62,7 @@ def _figures(one: RankedSite) -> dict[str, object]:
         "latitude_deg": round(site.latitude, DECIMALS),
         "longitude_deg": _within_a_turn(site.longitude),
         "sensors": len(site.sensors),
-        "types": sensors_text(site.sensors),
+        "types": sensors_text(site.sensors, {}),
         "price_usd": round(site.price_usd, 2),
         "gain_per_1000_usd": None if one.gain is None else round(one.gain, DIGITS),
     }

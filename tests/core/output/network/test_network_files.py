@@ -96,6 +96,17 @@ def test_names_stay_text(tmp_path):
     assert set(HOSTILE) <= {one["name"] for one in properties if one["kind"] == "site"}
 
 
+def test_people_read_products_and_programs_read_types(tmp_path):
+    record = make_network()
+    write_network(tmp_path, record)
+    for name in ("network.html", "report.html"):
+        text = (tmp_path / name).read_text(encoding="utf-8")
+        assert "× OS1-128" in text
+        assert "Product &lt;VLP&gt;" in text
+        assert "os1_128" not in text
+    assert any("× os1_128" in row["types"] for row in rows_of(tmp_path / "sites.csv"))
+
+
 @pytest.mark.filterwarnings("ignore:Glyph")
 def test_the_page_links_to_nothing_but_the_folders_of_its_sites():
     page = network_page(hostile_network(), make_streets())
