@@ -107,7 +107,7 @@ def draw_street_names(
         spare = (float(np.ptp(reach)) - MIN_NAME_ROOM * length) / 2
         half = np.abs(along) * length / 2 + NAME_SIZE / 72 * inch * 0.7
         tried = [middle + share * max(spare, 0.0) * along for share in NAME_SHIFTS]
-        free = [at for at in tried if not any(overlap((*(at - half), *(at + half)), box) for box in (*taken, *boxes))]
+        free = [at for at in tried if not any(_overlap((*(at - half), *(at + half)), box) for box in (*taken, *boxes))]
         if spare < 0 or not free:
             continue
         angle = (math.degrees(math.atan2(along[1], along[0])) + 90.0) % 180.0 - 90.0
@@ -120,7 +120,7 @@ def draw_street_names(
     return boxes
 
 
-def overlap(one: Window, other: Window) -> bool:
+def _overlap(one: Window, other: Window) -> bool:
     """Return whether two boxes overlap, each given by left, bottom, right and top."""
     return one[0] < other[2] and other[0] < one[2] and one[1] < other[3] and other[1] < one[3]
 
