@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,7 +17,6 @@ from ...choosing.placement.returns_summary import (
     FEW_RETURNS,
     NOT_BY_DETECTION,
     SURFACE_SEEN,
-    ReturnsSummary,
     returns_text,
 )
 from ...counts import counted
@@ -27,7 +26,7 @@ from ..results.answer import sentence
 from ..results.costs import Costs, costs_of
 from ..results.file_names import POSE_ERROR_PICTURES, TRAFFIC_PICTURES
 from ..results.located import LOCATED_FILES
-from ..results.placement_record import PlacementRecord, RecordedSensor, relevant_warnings
+from ..results.placement_record import RecordedSensor, relevant_warnings
 from ..results.verification_record import RecordedChange
 from ..results.verification_text import (
     LEAST_COST,
@@ -477,10 +476,8 @@ def _other_choices(evidence: Evidence) -> Iterator[Block]:
         notes.append(sentence(NOT_BY_DETECTION))
     notes.append("“Proven” refers to the model: this scene, these sensor models and this criterion.")
     yield Bullets(tuple(notes))
-    if record.returns is None and len(record.front) > 1:
+    if len(record.front if record.returns is None else record.returns.front) > 1:
         yield from _front(evidence)
-    elif record.returns is not None and len(record.returns.front) > 1:
-        yield from _returns_front(record, record.returns)
 
 
 def _same_price(evidence: Evidence) -> str:
@@ -505,59 +502,46 @@ def _weighted_share(evidence: Evidence) -> float:
 
 
 def _front(evidence: Evidence) -> Iterator[Block]:
-    record = evidence.record
-    weighted = " Coverage is weighted here." if np.ptp(evidence.site.problem.weights) > 0 else ""
+    """Yield the chart and the table of the best placements by number of sensors."""
+    record, returns, budget = evidence.record, evidence.record.returns, evidence.record.request.goal.budget
+    text: Callable[[float], str] = _percent if returns is None else returns_text
+    if returns is None:
+        rows = [
+            (point.count, 100 * point.coverage, 100 * point.missed, point.price, _others_see(point.missed))
+            for point in record.front
+        ]
+        weighted = " Coverage is weighted here." if np.ptp(evidence.site.problem.weights) > 0 else ""
+        measured, head, own = f"see:{weighted}", "Seen", 100 * _weighted_share(evidence)
+        label, highest = "road seen, %", 100.0
+    else:
+        rows = []
+        for point in returns.front:
+            more = (1.0 + point.returns) * (point.gap or 0.0)  # gaps are shares of 1 + returns
+            rows.append((point.count, point.returns, more, point.price, _others_have(point.returns, point.gap)))
+        measured = "typically measure these numbers of points on a road user in each revolution."
+        head, own, label = "Points", returns.typical, "typical points on a road user"
+        highest = max(value + more for _, value, more, *_ in rows)
+    limit = "" if budget is None else f" The budget of {dollars(budget)} does not limit the choices of this table."
     yield Paragraph(
         "With fewer or more sensors under the same rules, regardless of price, the best choices found by a short "
-        f"search see:{weighted}{_without_budget(record)}"
+        f"search {measured}{limit}"
     )
-    yield Picture(
-        front_chart(
-            [(point.count, 100 * point.coverage, 100 * point.missed) for point in record.front],
-            (len(record.sensors), 100 * _weighted_share(evidence)),
-            "road seen, %",
-            "{:.1f}%".format,
-            100.0,
-        ),
-        "Road seen by number of sensors; a line above a point extends to what no choice can exceed.",
+    chart = front_chart([row[:3] for row in rows], (len(record.sensors), own), label, text, highest)
+    what = f"{label[:1].upper()}{label[1:].removesuffix(', %')} by number of sensors"
+    yield Picture(chart, f"{what}; a line above a point extends to what no choice can exceed, where that is proven.")
+    yield Table(
+        ("Sensors", "Price installed, $" if record.installed else "Price, $", head, "Other choices"),
+        tuple((str(count), f"{price:,.0f}", text(value), words) for count, value, _, price, words in rows),
+        frozenset({0, 1, 2}),
     )
-    rows = tuple(
-        (
-            str(point.count),
-            f"{point.price:,.0f}",
-            percent(point.coverage),
-            "none sees more" if point.missed == 0 else f"at most {points(point.missed)} more",
-        )
-        for point in record.front
-    )
-    yield Table(("Sensors", _price_head(record), "Seen", "Other choices"), rows, frozenset({0, 1, 2}))
 
 
-def _returns_front(record: PlacementRecord, returns: ReturnsSummary) -> Iterator[Block]:
-    """Return the table of numbers of sensors of a placement that was chosen for returns."""
-    # Gaps are shares of 1 + returns.
-    charted = [(one.count, one.returns, (1.0 + one.returns) * (one.gap or 0.0)) for one in returns.front]
-    yield Paragraph(
-        "With fewer or more sensors under the same rules, regardless of price, the best choices found by a short "
-        "search typically measure these numbers of points on a road user in each revolution."
-        f"{_without_budget(record)}"
-    )
-    yield Picture(
-        front_chart(
-            charted,
-            (len(record.sensors), returns.typical),
-            "typical points on a road user",
-            returns_text,
-            max(value + more for _, value, more in charted),
-        ),
-        "Typical points on a road user by number of sensors; where there is a proof, a line above a point extends to "
-        "what no choice can exceed.",
-    )
-    rows = tuple(
-        (str(point.count), f"{point.price:,.0f}", returns_text(point.returns), _others_have(point.returns, point.gap))
-        for point in returns.front
-    )
-    yield Table(("Sensors", _price_head(record), "Points", "Other choices"), rows, frozenset({0, 1, 2}))
+def _others_see(missed: float) -> str:
+    return f"at most {points(missed)} more" if missed else "none sees more"
+
+
+def _percent(value: float) -> str:
+    return percent(value / 100)
 
 
 def _others_have(returns: float, gap: float | None) -> str:
@@ -565,15 +549,6 @@ def _others_have(returns: float, gap: float | None) -> str:
     if gap is None:
         return "may have more"
     return f"none has more than {returns_within(returns, gap)}" if gap else "none has more"
-
-
-def _without_budget(record: PlacementRecord) -> str:
-    budget = record.request.goal.budget
-    return "" if budget is None else f" The budget of {dollars(budget)} does not limit the choices of this table."
-
-
-def _price_head(record: PlacementRecord) -> str:
-    return "Price installed, $" if record.installed else "Price, $"
 
 
 def _losses(evidence: Evidence) -> Iterator[Block]:

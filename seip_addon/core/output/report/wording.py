@@ -7,14 +7,13 @@ import re
 from collections.abc import Mapping
 from datetime import datetime
 
-from ...choosing.placement.objective import CHOSEN_FOR, MOVED, MOVED_MESSAGE, Objective, certificate
-from ...choosing.placement.returns_summary import returns_text
+from ...choosing.placement.objective import CHOSEN_FOR, MOVED, MOVED_MESSAGE, Objective
 from ...counts import counted
 from ...sensing.lidar.catalogue import load_catalogue
 from ...site.scene_geometry import FROM_EXTRACT
 from ...site.sources import HEIGHTS_FROM
 from ..results.answer import possible_improvement, sentence
-from ..results.placement_record import RecordedObjective, RecordedSensor
+from ..results.placement_record import RecordedSensor
 from .evidence import Evidence
 
 LEVEL = 0.5  # metres between the road at the origin and zero in a model without heights
@@ -102,45 +101,18 @@ def plain_warning(warning: str, names: Mapping[str, str]) -> str:
     return sentence(f"{names[key]}: {rest}")
 
 
-def certificate_sentence(evidence: Evidence) -> str:
-    """Return the sentence on the proven optimality gap among the same positions."""
-    record = evidence.record
-    found, places = record.objective, record.counts.positions
-    if found.status == MOVED:
-        return MOVED_MESSAGE
-    if any(note.startswith(CHOSEN_FOR) for note in record.notes):
-        return certificate(found.status, found.gap, cheapest=found.cheapest, notes=record.notes)
-    choice = f"choice{limits_of(record.request.goal, 'of')} among the {places:,} positions, under the same rules,"
-    if found.bound is None:
-        return f"Another {choice} may be better; how much better is not known."
-    better = _cheaper(found) if found.cheapest else _more_coverage(evidence)
-    proven = "this is proven" if found.status == "optimal" else "this bound is proven"
-    return f"No other {choice} {better}: {proven}."
-
-
 def proof(evidence: Evidence) -> str:
-    """Return what is proven of a placement, without terms of optimisation."""
+    """Return what is proven of a placement among the same positions, without terms of optimisation."""
     record = evidence.record
     found = record.objective
-    if found.status == MOVED or not any(note.startswith(CHOSEN_FOR) for note in record.notes):
-        return certificate_sentence(evidence)
-    choice = f"choice{limits_of(record.request.goal, 'of')} among the {record.counts.positions:,} possible positions"
-    if found.status == "optimal":
-        return f"No other {choice} does better: this is proven."
-    if found.gap is None:
-        return f"Another {choice} may do better; how much better is not known."
-    returns, more = record.returns, possible_improvement(record)
-    if (
-        returns is not None
-        and more is not None
-        and math.isclose(math.expm1(found.value), returns.typical, rel_tol=1e-3)
-    ):
-        typical, most = returns_text(returns.typical), returns_within(returns.typical, more)
-        return (
-            f"Another {choice} may have more than {typical} points on a typical road user, but not more than {most}: "
-            "this bound is proven."
-        )
-    return f"Another {choice} may do better, by at most {math.ceil(found.gap * 1000 - 1e-9) / 10:.1f}%: this is proven."
+    if found.status == MOVED:
+        return MOVED_MESSAGE
+    limits = limits_of(record.request.goal, "of")
+    choice = f"choice{limits} among the {record.counts.positions:,} positions, under the same rules,"
+    if found.bound is None:
+        return f"Another {choice} may be better; how much better is not known."
+    proven = "this is proven" if found.status == "optimal" else "this bound is proven"
+    return f"No other {choice} {_better(evidence, found.bound)}: {proven}."
 
 
 def limits_of(goal: Objective, joint: str) -> str:
@@ -149,16 +121,20 @@ def limits_of(goal: Objective, joint: str) -> str:
     return count if goal.budget is None else f"{count} for at most {dollars(goal.budget)}"
 
 
-def _cheaper(found: RecordedObjective) -> str:
-    if found.status == "optimal" or found.bound is None:
-        return "reaches the required coverage at a lower price"
-    return f"is more than {dollars(max(0.0, found.value - found.bound))} cheaper"
-
-
-def _more_coverage(evidence: Evidence) -> str:
-    found = evidence.record.objective
+def _better(evidence: Evidence, bound: float) -> str:
+    """Return what no other choice does, as the predicate of a sentence."""
+    record, found = evidence.record, evidence.record.objective
+    returns, optimal = record.returns, found.status == "optimal"
+    if any(note.startswith(CHOSEN_FOR) for note in record.notes):
+        more = possible_improvement(record) or 0.0
+        if optimal:
+            return "does better"
+        if returns is not None and math.isclose(math.expm1(found.value), returns.typical, rel_tol=1e-3):
+            return f"has more than {returns_within(returns.typical, more)} points on a typical road user"
+        return f"is better by more than {math.ceil(more * 1000 - 1e-9) / 10:.1f}%"
+    if found.cheapest:
+        saved = f"is more than {dollars(max(0.0, found.value - bound))} cheaper"
+        return "reaches the required coverage at a lower price" if optimal else saved
+    more = max(0.0, bound - found.value) / math.fsum(evidence.site.problem.weights)
     what = "of the road" if found.kind == "vanilla" else "of the road, counted by its weights"
-    if found.status == "optimal" or found.bound is None:
-        return f"covers more {what}"
-    more = max(0.0, found.bound - found.value) / math.fsum(evidence.site.problem.weights)
-    return f"covers more than {points(more)} more {what}"
+    return f"covers more {what}" if optimal else f"covers more than {points(more)} more {what}"

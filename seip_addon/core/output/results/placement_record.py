@@ -6,33 +6,42 @@
 import json
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, fields, is_dataclass, replace
 from datetime import datetime
 from functools import cached_property
-from typing import Any, Literal
+from typing import Any, Literal, TypeVar, cast
 
 import numpy as np
 
 from ...arrays import Float, Integer
-from ...choosing.placement.deployment import GainBand, Sensor, TypeBand, price_text
+from ...choosing.placement.deployment import GainBand, Sensor, price_text
 from ...choosing.placement.judgement import Judgement
-from ...choosing.placement.objective import FrontPoint, Solution
+from ...choosing.placement.objective import FrontPoint, Objective, Solution
 from ...choosing.placement.problem import Placement
-from ...choosing.placement.returns_summary import CrossingReturns, ReturnsPoint, ReturnsSummary, share_reached
+from ...choosing.placement.returns_summary import CrossingReturns, ReturnsSummary, share_reached
+from ...choosing.placement.search_limits import DEFAULT_EFFORT
 from ...geometry.geo_reference import GeoReference
 from ...geometry.orientation import orientation
 from ...sensing.lidar.model import LidarModel
 from ...sensing.scans.sensor import MountedSensor
+from ...sensing.visibility.settings import Engine, VisibilitySettings
+from ...sensing.weather import Weather
+from ...site.candidates import CandidateSettings
+from ...site.installed_cost import InstalledCost
 from ...site.site import Site
 from ...site.sources import SourceCount
 from ...storage.json_dataclass import from_json
 from .headings import degrees, tilt_degrees
-from .recorded_settings import RecordedSettings
 
 Point = tuple[float, float, float]
 MapPoint = tuple[float, float, float]
 
+Value = TypeVar("Value")
+
 SCHEMA = "seip-placement/3"
+SHARE_DIGITS = 9
+DIGITS = {"price": 2, "typical": 3, "of_each": 3, "least": 3, "returns": 3}
+"""Decimal places of what is not a share: dollars, and returns to what single precision holds."""
 
 
 @dataclass(frozen=True)
@@ -224,6 +233,32 @@ class RecordedTimes:
 
 
 @dataclass(frozen=True)
+class RecordedSettings:
+    """Settings of a placement; records of earlier versions may lack all but the objective and the sensor types.
+
+    Parameters
+    ----------
+    goal : Objective
+    catalogue : tuple of str
+        Names of the user's own catalogues, without their folders.
+    render : bool
+        Whether the result includes a rendered view.
+    """
+
+    goal: Objective
+    candidates: CandidateSettings
+    visibility: VisibilitySettings = VisibilitySettings()
+    weather: Weather = Weather()
+    grid_spacing_m: float = 1.0
+    catalogue: tuple[str, ...] = ()
+    engine: Engine = "auto"
+    solver: str = "auto"
+    effort: float = DEFAULT_EFFORT
+    installed_cost: InstalledCost | None = None
+    render: bool = False
+
+
+@dataclass(frozen=True)
 class PlacementRecord:
     """Content of ``placement.json`` without its schema, key by key; see docs/formats.md.
 
@@ -346,7 +381,7 @@ def placement_record(
             central=None if deployment.central is None else _share(deployment.central),
             weighted=_share(deployment.weighted),
             seen_twice=_share(deployment.seen_twice),
-            gain_band=deployment.gain_band and _rounded_band(deployment.gain_band),
+            gain_band=_rounded_parts(deployment.gain_band),
         ),
         objective=RecordedObjective(
             kind="vanilla" if solution.objective.central_weight is None else "weighted",
@@ -369,9 +404,9 @@ def placement_record(
             provenance.created.isoformat(timespec="seconds"),
             {step: _rounded(seconds, 3) for step, seconds in provenance.durations.items()},
         ),
-        returns=deployment.returns and _rounded_returns(deployment.returns),
-        front=tuple(_rounded_point(point) for point in solution.front),
-        crossings=_rounded_crossings(solution.crossings),
+        returns=_rounded_parts(deployment.returns),
+        front=_rounded_parts(tuple(solution.front)),
+        crossings=_rounded_parts(tuple(solution.crossings)),
         judgement=solution.judgement,
     )
 
@@ -426,36 +461,27 @@ def recorded_sensor(sensor: Sensor, site: Site) -> RecordedSensor:
     )
 
 
-def _rounded_band(band: GainBand) -> GainBand:
-    types = tuple(TypeBand(one.sensor, _share(one.low), _share(one.high)) for one in band.types)
-    return replace(band, low=_share(band.low), high=_share(band.high), types=types)
-
-
 def _sought(solution: Solution) -> Literal["most coverage", "most returns", "least price"]:
     if solution.objective.cheapest:
         return "least price"
     return "most coverage" if solution.deployment.returns is None else "most returns"
 
 
-def _rounded_returns(returns: ReturnsSummary) -> ReturnsSummary:
-    """Round to what single precision holds."""
-    of_each = {name: _rounded(number, 3) for name, number in returns.of_each.items()}
-    front = tuple(
-        ReturnsPoint(
-            one.count, _rounded(one.returns, 3), _rounded(one.price, 2), None if one.gap is None else _share(one.gap)
+def _rounded_parts(value: Value, digits: int = SHARE_DIGITS) -> Value:
+    """Round all numbers in a dataclass, tuple or mapping: shares, or what `DIGITS` has by its name."""
+    rounded: Any = value
+    if isinstance(value, float):
+        rounded = _rounded(value, digits)
+    elif isinstance(value, tuple):
+        rounded = tuple(_rounded_parts(part, digits) for part in value)
+    elif isinstance(value, Mapping):
+        rounded = {name: _rounded_parts(part, digits) for name, part in value.items()}
+    elif is_dataclass(value) and not isinstance(value, type):
+        parts = {each.name: getattr(value, each.name) for each in fields(value)}
+        rounded = replace(
+            value, **{name: _rounded_parts(part, DIGITS.get(name, digits)) for name, part in parts.items()}
         )
-        for one in returns.front
-    )
-    enough = {name: _share(share) for name, share in returns.enough.items()}
-    return ReturnsSummary(_rounded(returns.typical, 3), of_each, _rounded_crossings(returns.crossings), front, enough)
-
-
-def _rounded_crossings(crossings: Iterable[CrossingReturns]) -> tuple[CrossingReturns, ...]:
-    return tuple(replace(one, least=_rounded(one.least, 3)) for one in crossings)
-
-
-def _rounded_point(point: FrontPoint) -> FrontPoint:
-    return FrontPoint(point.count, _share(point.coverage), _rounded(point.price, 2), _share(point.missed))
+    return cast("Value", rounded)
 
 
 def _greedy(greedy: Placement, placement: Placement, *, of_returns: bool) -> RecordedGreedy:
@@ -488,7 +514,7 @@ def _metres(point: Float) -> Point:
 
 
 def _share(value: float) -> float:
-    return _rounded(value, 9)
+    return _rounded(value, SHARE_DIGITS)
 
 
 def _rounded(value: float, digits: int) -> float:

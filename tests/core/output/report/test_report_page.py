@@ -16,7 +16,7 @@ from seip_addon.core.output.report.blocks import Card, Facts, Paragraph, Picture
 from seip_addon.core.output.report.evidence import load_evidence
 from seip_addon.core.output.report.html import as_html
 from seip_addon.core.output.report.sections import make_report
-from seip_addon.core.output.report.wording import altitude_zero, certificate_sentence, returns_within
+from seip_addon.core.output.report.wording import altitude_zero, proof, returns_within
 from seip_addon.core.output.report.write import write_report
 from seip_addon.core.output.results.costs import costs_of
 from seip_addon.core.output.results.file_names import REPORT_FILES
@@ -152,13 +152,13 @@ def test_the_pdf_is_whole_and_dated_by_the_record(folder):
                 "gap": 0.5,
                 "status": "feasible",
             },
-            r"Within 50\.00% of the best",
+            r"is better by more than 50\.0%: this bound is proven",
         ),
     ],
 )
 def test_the_certificate_is_a_sentence_for_engineers(tmp_path, goal, found, says):
     make_folder(tmp_path, goal=goal, **found)
-    assert re.search(says, certificate_sentence(load_evidence(tmp_path)))
+    assert re.search(says, proof(load_evidence(tmp_path)))
 
 
 def test_every_sensor_has_a_card_with_its_place_and_its_costs(folder):
