@@ -300,6 +300,9 @@ class PlacementRecord:
     crossings: tuple[CrossingReturns, ...] = ()
     judgement: Judgement | None = None
 
+    def __post_init__(self) -> None:
+        _ = self.request  # refuses settings that cannot be read again
+
     @cached_property
     def request(self) -> RecordedSettings:
         """The settings that this program reads again."""

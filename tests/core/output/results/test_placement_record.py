@@ -169,7 +169,7 @@ def test_the_same_run_gives_the_same_bytes_but_for_times_and_versions(example, r
         ('{"schema": "seip-placement/0"}', "seip-placement/0"),
         (
             '{"schema": "seip-placement/3", "site": 3}',
-            "json is damaged .*: site must be an object, not 3; place",
+            "json is damaged: site must be an object, not 3; place",
         ),
     ],
 )
