@@ -153,10 +153,12 @@ class NetworkRecord:
             if self.least_usd >= self.price_usd * (1.0 - PROVEN):
                 return f"Proven: nothing cheaper among these sites and candidates sees {whole}."
             return f"Nothing for less than ${self.least_usd:,.0f} sees {whole}: at most {self.saving:.2%} can be saved."
-        what = "returns from road users" if self.criterion == "returns" else "road seen"
-        if self.gap <= PROVEN:
-            return f"Proven: no other use of {money} among these sites and candidates has more {what}."
-        return f"At most {self.gap:.2%} more {what} is possible for {money} among these sites and candidates."
+        use = f"Proven: no other use of {money} among these sites and candidates"
+        if self.criterion == "road":
+            most = "" if self.gap <= PROVEN else f" than {math.ceil(self.bound * 1000 - 1e-6) / 10:.1f}%"
+            return f"{use} sees more{most} of the road."
+        most = "" if self.gap <= PROVEN else f" than {math.ceil(10 * math.expm1(self.bound) - 1e-6) / 10:,.1f}"
+        return f"{use} has more{most} returns from a typical road user."
 
     @property
     def saving(self) -> float:

@@ -162,3 +162,20 @@ def test_networks_without_sensors_are_written(tmp_path, status, sites):
     assert "No site has sensors." in (tmp_path / "network.html").read_text(encoding="utf-8")
     assert facts(record)["Sensors"] == "none"
     assert ("Proof" in facts(record)) == (status != "failed")
+
+
+@pytest.mark.parametrize(
+    ("criterion", "value", "bound", "words"),
+    [
+        ("road", 0.7, 0.7, "sees more of the road."),
+        ("road", 0.7, 0.7121, "sees more than 71.3% of the road."),
+        ("returns", math.log(16.0), math.log(17.31), "has more than 16.4 returns from a typical road user."),
+    ],
+)
+def test_the_certificate_gives_the_bound_rounded_up(criterion, value, bound, words):
+    record = make_network(2, criterion=criterion, value=value, bound=bound)
+    assert (
+        record.certificate
+        == f"Proven: no other use of ${record.budget_usd:,.0f} among these sites and candidates {words}"
+    )
+    assert facts(record)["Proof"] == record.certificate
