@@ -20,6 +20,7 @@ from ...site.site import Site
 from .coverage_colours import of_placement
 from .drawing import (
     SENSOR_MARK,
+    Style,
     add_axes,
     credits_box,
     credits_of,
@@ -33,15 +34,20 @@ from .drawing import (
     wrapped,
 )
 from .palette import FORBIDDEN, INK, MANDATORY, SOFT_INK, WEIGHTED
-from .plan_map import SENSOR, MapContent, Window, draw_map, draw_street_names, map_content, mark_boxes
-from .plan_style import (
+from .plan_map import (
     ASSUMED_HEIGHT,
     ASSUMED_MARK,
     HEIGHT_CMAP,
     OTHER_ROAD,
     POLE_MARK,
+    SENSOR,
     SIDEWALK_MARK,
-    Style,
+    MapContent,
+    Window,
+    draw_map,
+    draw_street_names,
+    map_content,
+    mark_boxes,
 )
 from .scale_bar import draw_north, draw_scale, north_paper, scale_paper
 

@@ -16,10 +16,9 @@ from ...counts import counted
 from ...sensing.scans.frame import Frame, Labels
 from ...sensing.scans.sensor import MountedSensor
 from .cloud_colours import sensor_colour
-from .drawing import LABEL_SIZE, SENSOR_MARK, add_axes, draw_attribution, draw_polygons, save_png
+from .drawing import LABEL_SIZE, SENSOR_MARK, Style, add_axes, draw_attribution, draw_polygons, save_png
 from .palette import INK, INTENSITY_COLOURS, MAX_INTENSITY, PAPER, SEEN_COLOURS, SOFT_INK
 from .plan_map import draw_area
-from .plan_style import Style
 from .scale_bar import draw_scale
 
 DPI = 160

@@ -8,9 +8,8 @@ import numpy as np
 from matplotlib.colors import ListedColormap
 
 from ...arrays import Float
-from ..pictures.drawing import as_png, draw_attribution, draw_callouts, new_page
+from ..pictures.drawing import Style, as_png, draw_attribution, draw_callouts, new_page
 from ..pictures.palette import INK, PAPER, SEEN_COLOURS, SOFT_INK
-from ..pictures.plan_style import Style
 from ..pictures.scale_bar import draw_north, draw_scale, north_paper, scale_paper
 from .blind_spots import BlindSpot
 from .evidence import Evidence
