@@ -31,7 +31,7 @@ from .interrupts import held_signals
 
 WIDTH, HEIGHT = 1440, 810  # pixels
 SAMPLES, DENOISED_SAMPLES = 12, 2  # without and with a denoiser, for as little noise or less
-AZIMUTHS, ELEVATION = np.radians(-115.0 + 45.0 * np.arange(8)), math.radians(52.0)
+AZIMUTHS, ELEVATION = np.radians(-115.0 + 45.0 * np.arange(8)), math.radians(60.0)
 """Directions of the camera, seen from the region."""
 MOST_POINTS = 400  # places on the road at which the view is checked for obstacles
 EQUAL_VIEW = 0.05  # share of the road by which views that hide less than others are as good as the best
