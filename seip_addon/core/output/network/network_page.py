@@ -12,7 +12,7 @@ from ...arrays import Integer
 from ...counts import counted, round_number
 from ..pictures.drawing import percent
 from ..pictures.palette import INK, PAPER, PAPER_STREETS, SHARE_COLOURS, SOFT_INK
-from ..report.html import STYLE
+from ..report.html import page
 from ..report.wording import dollars
 from .network_record import NetworkRecord, NetworkSite
 from .network_view import BARE_RADIUS, NetworkView, Street, legend_money, network_view, radius_of
@@ -64,7 +64,6 @@ def network_page(record: NetworkRecord, streets: Sequence[Street] | None = None)
     """Return the page; its links lead to the folders of the sites beside it."""
     view = network_view(record, streets, SHAPES)
     ranked = ranked_sites(record)
-    policy = "default-src 'none'; style-src 'unsafe-inline'"
     equipped = sum(site.status == "equipped" for site in record.sites)
     summary = (
         f"{equipped:,} of {counted(len(record.sites), 'site has', 'sites have')} sensors for "
@@ -74,17 +73,7 @@ def network_page(record: NetworkRecord, streets: Sequence[Street] | None = None)
         else "No site has sensors."
     )
     credits_ = "".join(f"<div>{escape(line)}</div>" for line in record.attribution)
-    return f"""<!DOCTYPE html>
-<html lang="en">
-<head>
-<meta charset="utf-8">
-<meta http-equiv="Content-Security-Policy" content="{escape(policy)}">
-<meta name="viewport" content="width=device-width, initial-scale=1">
-<title>{escape(record.name)}</title>
-<style>{STYLE}{MAP_STYLE}</style>
-</head>
-<body>
-<header>
+    body = f"""<header>
 <h1><bdi>{escape(record.name)}</bdi></h1>
 <p class="subtitle">{escape(summary)}</p>
 </header>
@@ -97,10 +86,8 @@ def network_page(record: NetworkRecord, streets: Sequence[Street] | None = None)
 <div class="wide">
 {_table(record, ranked)}
 </div>
-</main>
-</body>
-</html>
-"""
+</main>"""
+    return page(record.name, body, MAP_STYLE)
 
 
 def _map(record: NetworkRecord, view: NetworkView, ranked: tuple[RankedSite, ...]) -> str:

@@ -60,27 +60,27 @@ code { display: block; background: #eef1f3; padding: .6em .8em; overflow-wrap: a
 
 def as_html(report: Report) -> str:
     """Return the page."""
-    title = escape(report.title)
     sections = "\n".join(
         f"<section>\n<h2>{escape(section.title)}</h2>\n{_blocks(section.blocks)}\n</section>"
         for section in report.sections
     )
+    header = f'<h1>{escape(report.title)}</h1>\n<p class="subtitle">{escape(report.subtitle)}</p>'
+    return page(report.title, f"<header>\n{header}\n{_blocks(report.first)}\n</header>\n{sections}")
+
+
+def page(title: str, body: str, style: str = "") -> str:
+    """Return a page that loads nothing, with the style of reports and more."""
     return f"""<!DOCTYPE html>
 <html lang="en">
 <head>
 <meta charset="utf-8">
 <meta http-equiv="Content-Security-Policy" content="{escape(POLICY)}">
 <meta name="viewport" content="width=device-width, initial-scale=1">
-<title>{title}</title>
-<style>{STYLE}</style>
+<title>{escape(title)}</title>
+<style>{STYLE}{style}</style>
 </head>
 <body>
-<header>
-<h1>{title}</h1>
-<p class="subtitle">{escape(report.subtitle)}</p>
-{_blocks(report.first)}
-</header>
-{sections}
+{body}
 </body>
 </html>
 """

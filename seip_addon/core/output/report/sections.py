@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -60,44 +59,6 @@ from .wording import (
     proof,
     returns_within,
 )
-
-
-@dataclass(frozen=True)
-class Failures:
-    """Share of the targets that is still seen when each sensor fails.
-
-    Parameters
-    ----------
-    left : tuple of float
-        In the order of the sensors.
-    """
-
-    left: tuple[float, ...]
-
-    @property
-    def worst(self) -> float:
-        """Coverage after the worst failure."""
-        return min(self.left)
-
-    @property
-    def mean(self) -> float:
-        """Mean coverage over the failures of each sensor."""
-        return sum(self.left) / len(self.left)
-
-
-def failures(seen: Boolean) -> Failures | None:
-    """Return what is left when a sensor fails, None where there is none.
-
-    Parameters
-    ----------
-    seen : (k, t) bool
-        What each sensor sees.
-    """
-    if not len(seen):
-        return None
-    times = seen.sum(axis=0)
-    return Failures(tuple(float(np.count_nonzero(times - row > 0)) / seen.shape[1] for row in seen))
-
 
 MOST_SPOTS = 8
 LEAST_TILT = 0.05  # degrees, below which a sensor is upright
@@ -223,9 +184,9 @@ def _summary(evidence: Evidence) -> str:
             f"A pedestrian in plain view on a crossing returns at least {returns_text(least.least)} points in each "
             f"revolution (at the worst point of the {in_sentence(least.name)})."
         )
-    failed = failures(evidence.site.seen)
-    if failed is not None and len(record.sensors) > 1:
-        parts.append(f"If any one sensor fails, at least {percent(failed.worst)} of the road is still seen.")
+    if len(record.sensors) > 1:
+        least_left = percent(min(after_failures(evidence.site.seen)))
+        parts.append(f"If any one sensor fails, at least {least_left} of the road is still seen.")
     parts.append(proof(evidence))
     return " ".join(parts)
 
@@ -551,19 +512,25 @@ def _others_have(returns: float, gap: float | None) -> str:
     return f"none has more than {returns_within(returns, gap)}" if gap else "none has more"
 
 
+def after_failures(seen: Boolean) -> list[float]:
+    """Return the share of the targets that is still seen when each sensor fails, from what each sees, (k, t)."""
+    times = seen.sum(axis=0)
+    return [float(np.count_nonzero(times - row > 0)) / seen.shape[1] for row in seen]
+
+
 def _losses(evidence: Evidence) -> Iterator[Block]:
     record = evidence.record
-    failed = failures(evidence.site.seen)
-    if failed is not None and len(record.sensors) > 1:
-        worst = record.sensors[failed.left.index(failed.worst)].id
-        seen, least = percent(failed.mean), percent(failed.worst)
+    left = after_failures(evidence.site.seen)
+    if len(left) > 1:
+        worst = record.sensors[left.index(min(left))].id
+        seen, least = percent(sum(left) / len(left)), percent(min(left))
         worse = f" on average, and {least} in the worst case, the failure of {worst}" if seen != least else ""
         yield Paragraph(f"After the failure of one sensor, {seen} of the road is still seen{worse}.")
         yield Table(
             ("Failed", "Still seen", "Lost"),
             tuple(
-                (sensor.id, percent(left), percent(max(0.0, record.coverage.whole - left)))
-                for sensor, left in zip(record.sensors, failed.left, strict=True)
+                (sensor.id, percent(share), percent(max(0.0, record.coverage.whole - share)))
+                for sensor, share in zip(record.sensors, left, strict=True)
             ),
             frozenset({1, 2}),
         )

@@ -34,7 +34,6 @@ from ...storage.json_dataclass import from_json
 from .headings import degrees, tilt_degrees
 
 Point = tuple[float, float, float]
-MapPoint = tuple[float, float, float]
 
 Value = TypeVar("Value")
 
@@ -73,7 +72,7 @@ class RecordedGeoReference:
     """Georeference of the scene's map; UTM zones are those of its hemisphere, see `GeoReference.in_hemisphere`."""
 
     projection: str
-    header_offset_m: MapPoint
+    header_offset_m: Point
     header_heading_deg: float
 
     @property
@@ -99,7 +98,7 @@ class RecordedSite:
     """
 
     name: str
-    origin_m: MapPoint
+    origin_m: Point
     geo_reference: RecordedGeoReference | None = None
     sources: tuple[SourceCount, ...] = ()
     attribution: tuple[str, ...] = ()
@@ -139,7 +138,7 @@ class RecordedSensor:
     position: str
     on_pole: bool
     local_m: Point
-    map_m: MapPoint
+    map_m: Point
     height_m: float
     yaw_deg: float
     tilt_deg: float
