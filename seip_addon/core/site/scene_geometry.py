@@ -26,6 +26,8 @@ OTHER_LEVELS = "Roads on other levels"
 FROM_MAP, DESCRIBED, ASSUMED = "map", "site description", "assumed"
 FROM_EXTRACT, FROM_SURVEY = "extract", "survey"
 """Source of an object: the map, the site description, an assumption, OpenStreetMap, a survey."""
+HEIGHTS_FROM = "roads and ground take their heights from "
+"""First words of the assumption that names a file of terrain; the file follows, then a comma."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,9 +8,6 @@ from dataclasses import dataclass
 _NUMBER = re.compile(r"[ ._]*\d+( of the [a-z ]+)?$")
 
 
-HEIGHTS_FROM = "roads and ground take their heights from "
-"""First words of the assumption that names a file of terrain; the file follows, then a comma."""
-
 _JOINERS = "\u200c\u200d"  # needed in Persian and Hindi, and for emoji
 
 

@@ -10,8 +10,7 @@ from datetime import datetime
 from ...choosing.placement.objective import CHOSEN_FOR, MOVED, MOVED_MESSAGE, Objective
 from ...counts import counted
 from ...sensing.lidar.catalogue import load_catalogue
-from ...site.scene_geometry import FROM_EXTRACT
-from ...site.sources import HEIGHTS_FROM
+from ...site.scene_geometry import FROM_EXTRACT, HEIGHTS_FROM
 from ..results.answer import possible_improvement, sentence
 from ..results.placement_record import RecordedSensor
 from .evidence import Evidence

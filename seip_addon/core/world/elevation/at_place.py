@@ -20,8 +20,7 @@ from ...geometry.reference_systems import reprojection
 from ...geometry.solids import Solid
 from ...progress import Progress
 from ...settings import setting
-from ...site.scene_geometry import FROM_SURVEY
-from ...site.sources import HEIGHTS_FROM
+from ...site.scene_geometry import FROM_SURVEY, HEIGHTS_FROM
 from ..streetscape.description import PlacedSolid, SiteDescription, without_covered_buildings
 from ..streetscape.terrain import Relief
 from .geotiff import GeoTiff, read_geotiff

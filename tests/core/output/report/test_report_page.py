@@ -23,7 +23,8 @@ from seip_addon.core.output.results.file_names import REPORT_FILES
 from seip_addon.core.output.results.placement_record import RecordedGeoReference
 from seip_addon.core.progress import finish
 from seip_addon.core.site.installed_cost import load_installed_cost
-from seip_addon.core.site.sources import HEIGHTS_FROM, SourceCount
+from seip_addon.core.site.scene_geometry import HEIGHTS_FROM
+from seip_addon.core.site.sources import SourceCount
 from tests.builders.report_folder import CROSSING, NAME, make_folder
 
 EFFORT = 0.2
