@@ -3,7 +3,7 @@
 import os
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from functools import partial
 
 import numpy as np
 import shapely
@@ -66,7 +66,10 @@ TEXT_X, LABEL_X, SHARE_ROOM = 0.34, 0.78, 0.55  # inches: of text beside a mark,
 MOST_TOGETHER = 12  # rows of a section that stay in one column
 HEIGHT_STEP = 0.1  # inches, by which a legend grows until its columns suffice
 
-Draw = Callable[["_Column"], None]
+BOLD: Style = {"weight": "bold"}
+ASIDE: Style = {"size": SMALL, "color": SOFT_INK}
+Sign = Callable[[Axes, float, float], object]
+"""Draws a sign into axes in inches, at the left end and the middle of a row's first line."""
 
 
 def save_plan_view(  # what a plan shows
@@ -175,37 +178,29 @@ def _bounds(shown: BaseGeometry) -> tuple[float, float, float, float]:
 
 @dataclass(frozen=True, eq=False)
 class _Row:
-    """A part of the legend that stays in one column: its height in inches, and what draws it at the column's place.
+    """A part of the legend that stays in one column.
 
     Parameters
     ----------
+    texts : tuple of (float, float, str, Style)
+        Inches from the left and from the first line downwards, text, and style; a position of ``inf`` is the right end.
+    height : float, inches
     joined : bool
         Whether the next row stays in the same column, as below a heading.
     """
 
+    texts: tuple[tuple[float, float, str, Style], ...]
     height: float
-    draw: Draw
+    sign: Sign | None = None
     joined: bool = False
 
-
-@dataclass
-class _Column:
-    """A place in the legend at which a row is drawn, inches from its upper left corner, and the width of the column."""
-
-    axes: Axes
-    x: float
-    y: float
-    width: float
-
-    def text(self, x: float, words: str, *, down: float = 0.0, **style: Any) -> None:  # noqa: ANN401 - matplotlib's own
-        plain: Style = {"size": SIZE, "color": INK, "ha": "left", "va": "center", "parse_math": False}
-        self.axes.text(self.x + x, self.y + down, words, **plain | style)
-
-    def swatch(self, **style: Any) -> None:  # noqa: ANN401 - matplotlib's own
-        self.axes.add_patch(Rectangle((self.x + 0.02, self.y - 0.07), 0.2, 0.14, **style))
-
-    def mark(self, **style: Any) -> None:  # noqa: ANN401 - matplotlib's own
-        self.axes.plot(self.x + 0.12, self.y, clip_on=False, **style)
+    def draw(self, axes: Axes, x: float, y: float, width: float) -> None:
+        if self.sign is not None:
+            self.sign(axes, x, y)
+        for left, down, words, style in self.texts:
+            plain: Style = {"size": SIZE, "color": INK, "va": "center", "parse_math": False}
+            plain["ha"] = "right" if left > width else "left"
+            axes.text(x + min(left, width), y + down, words, **plain | style)
 
 
 class PlanLegend:
@@ -220,18 +215,17 @@ class PlanLegend:
     """
 
     def __init__(self, content: MapContent, width: float, notes: Sequence[str]) -> None:
-        self._column_width = (width - (COLUMNS - 1) * COLUMN_GAP) / COLUMNS
+        self._column = (width - (COLUMNS - 1) * COLUMN_GAP) / COLUMNS
         self._width = width
-        assumed = any(mesh.height_assumed for mesh in content.geometry.occluders)
         sections = (
             self._sensors(content.deployment),
             self._targets(content.site, content.deployment),
             self._map(content.geometry, content.site),
-            self._heights(content.heights, assumed=assumed),
+            self._heights(content),
             self._notes(notes),
         )
         self._rows = [row for section in sections for row in _together(list(section))]
-        self.height = max(*map(self._tall, range(len(self._rows))), self._least_height())
+        self.height = max(*map(self._tall, range(len(self._rows))), sum(row.height for row in self._rows) / COLUMNS)
         while len({column for column, _ in self._places()}) > COLUMNS:
             self.height += HEIGHT_STEP
 
@@ -240,96 +234,81 @@ class PlanLegend:
         axes.axis("off")
         axes.set(xlim=(0.0, self._width), ylim=(self.height, 0.0))
         for row, (column, y) in zip(self._rows, self._places(), strict=True):
-            row.draw(_Column(axes, column * (self._column_width + COLUMN_GAP), y, self._column_width))
-
-    def _least_height(self) -> float:
-        return sum(row.height for row in self._rows) / COLUMNS
+            row.draw(axes, column * (self._column + COLUMN_GAP), y, self._column)
 
     def _tall(self, start: int) -> float:
         """Return the height of a row and of all that must stay below it in its column."""
-        height = self._rows[start].height
-        while self._rows[start].joined and start + 1 < len(self._rows):
-            start += 1
-            height += self._rows[start].height
-        return height
+        row = self._rows[start]
+        return row.height + (self._tall(start + 1) if row.joined and start + 1 < len(self._rows) else 0.0)
 
     def _places(self) -> list[tuple[int, float]]:
-        """Return the column of each row, and the distance of its middle line from the top."""
-        places, column, y = [], 0, 0.0
+        """Return the column of each row, and the distance of its first line from the top."""
+        places, column, y, follows = [], 0, 0.0, False
         for number, row in enumerate(self._rows):
-            follows = number > 0 and self._rows[number - 1].joined
             if y > 0.0 and not follows and y + self._tall(number) > self.height + 1e-9:
                 column, y = column + 1, 0.0
             places.append((column, y + 0.12))
-            y += row.height
+            y, follows = y + row.height, row.joined
         return places
 
     def _sensors(self, deployment: Deployment) -> Iterator[_Row]:
-        """Yield a row for each sensor, and a heading in front."""
-        if not deployment.sensors:
-            return
-        yield self._heading("Sensors", "sees of the road")
+        if deployment.sensors:
+            yield self._heading("Sensors", "sees of the road")
         markers = markers_of(deployment)
-        for last, sensor in zip((*(False,) * (len(deployment.sensors) - 1), True), deployment.sensors, strict=True):
+        for sensor in deployment.sensors:
+            last = sensor is deployment.sensors[-1]
             yield self._sensor(sensor, markers[sensor.model.key], AFTER if last else 0.0)
 
     def _sensor(self, sensor: Sensor, marker: str, after: float) -> _Row:
-        room = self._column_width - LABEL_X
-        lines = wrapped(sensor.model.name, room - SHARE_ROOM, SIZE)
+        room = self._column - LABEL_X
+        names = wrapped(sensor.model.name, room - SHARE_ROOM, SIZE)
         below = wrapped(f"{sensor.height:.3g} m high{sensor.turned}, {sensor.position_name}", room, SMALL)
-
-        def draw(at: _Column) -> None:
-            at.mark(marker=marker, **SENSOR_MARK | {"markersize": 8.0, "mew": 0.8})
-            at.text(TEXT_X, sensor.label, weight="bold")
-            at.text(at.width, f"{sensor.alone:.0%}", ha="right", weight="bold")
-            for number, line in enumerate(lines):
-                at.text(LABEL_X, line, down=number * LINE)
-            for number, line in enumerate(below):
-                at.text(LABEL_X, line, down=len(lines) * LINE + number * SMALL_LINE - 0.02, size=SMALL, color=SOFT_INK)
-
-        return _Row(len(lines) * LINE + len(below) * SMALL_LINE + 0.04 + after, draw)
+        texts: list[tuple[float, float, str, Style]] = [
+            *((TEXT_X, 0.0, sensor.label, BOLD), (np.inf, 0.0, f"{sensor.alone:.0%}", BOLD)),
+            *((LABEL_X, number * LINE, line, {}) for number, line in enumerate(names)),
+            *((LABEL_X, len(names) * LINE + n * SMALL_LINE - 0.02, line, ASIDE) for n, line in enumerate(below)),
+        ]
+        sign = partial(_mark, SENSOR_MARK | {"marker": marker, "markersize": 8.0, "mew": 0.8})
+        return _Row(tuple(texts), len(names) * LINE + len(below) * SMALL_LINE + 0.04 + after, sign)
 
     def _targets(self, site: Site, deployment: Deployment) -> Iterator[_Row]:
         shown = of_placement(deployment)
         yield self._heading(shown.title)
         for words, colour, share in reversed(list(zip(shown.words, shown.colours, shown.shares, strict=True))):
-            yield self._swatch(words, percent(share), facecolor=colour)
-        squares = f"share of the road, in {counted(len(site.targets), 'square')} of {site.targets.spacing:g} m"
-        yield self._small(squares)
+            yield self._line(words, partial(_swatch, {"facecolor": colour}), percent(share))
+        yield self._small(f"share of the road, in {counted(len(site.targets), 'square')} of {site.targets.spacing:g} m")
 
     def _map(self, geometry: SceneGeometry, site: Site) -> Iterator[_Row]:
         yield self._heading("Map")
-        rows = [self._swatch("region of interest", facecolor="none", edgecolor=INK, linewidth=1.1)]
+        swatches: list[tuple[str, Style]] = [("region of interest", {"edgecolor": INK, "linewidth": 1.1})]
         if any(mesh.name.startswith(OTHER_LEVELS) for mesh in geometry.ground):
-            rows.append(self._swatch("road on another level", **OTHER_ROAD))
-        dashed: Style = {"facecolor": "none", "edgecolor": WEIGHTED, "linewidth": 1.4, "linestyle": (0, (4, 1.5))}
-        rows += [self._swatch(words, **dashed) for words in _weighted(geometry.weighted_regions)]
-        for areas, colour, hatch, words in (
-            (geometry.forbidden_areas, FORBIDDEN, "////", "no sensor here"),
-            (geometry.mandatory_areas, MANDATORY, "....", "at least one sensor here"),
-        ):
-            if areas:
-                rows.append(self._swatch(words, facecolor="none", edgecolor=colour, hatch=hatch, linewidth=0.9))
-        rows += [self._marked(words, mark) for count, mark, words in _positions(geometry, site) if count]
+            swatches.append(("road on another level", OTHER_ROAD))
+        dashed: Style = {"edgecolor": WEIGHTED, "linewidth": 1.4, "linestyle": (0, (4, 1.5))}
+        swatches += [(words, dashed) for words in _weighted(geometry.weighted_regions)]
+        if geometry.forbidden_areas:
+            swatches.append(("no sensor here", {"edgecolor": FORBIDDEN, "hatch": "////", "linewidth": 0.9}))
+        if geometry.mandatory_areas:
+            swatches.append(("at least one sensor here", {"edgecolor": MANDATORY, "hatch": "....", "linewidth": 0.9}))
+        rows = [self._line(words, partial(_swatch, {"facecolor": "none"} | style)) for words, style in swatches]
+        for count, mark, words in _positions(geometry, site):
+            if count:
+                larger = mark | {"markersize": mark["markersize"] * 1.4}
+                rows.append(self._line(words, partial(_mark, larger)))
         yield from rows[:-1]
-        yield _Row(rows[-1].height + AFTER, rows[-1].draw)
+        yield replace(rows[-1], height=rows[-1].height + AFTER)
 
-    def _heights(self, norm: Normalize, *, assumed: bool) -> Iterator[_Row]:
+    def _heights(self, content: MapContent) -> Iterator[_Row]:
         yield self._heading("Obstacles", "height above the road")
-        highest = float(norm.vmax or 0.0)
-
-        def draw(at: _Column) -> None:
-            ramp = np.linspace(0.0, highest, 128)[None, :]
-            extent = (at.x, at.x + 2.2, at.y + 0.1, at.y - 0.06)
-            at.axes.imshow(HEIGHT_CMAP(norm(ramp)), extent=extent, aspect="auto", interpolation="nearest")
-            for share, align in ((0.0, "left"), (0.5, "center"), (1.0, "right")):
-                unit = " m" if share == 1.0 else ""
-                at.text(2.2 * share, f"{highest * share:g}{unit}", down=0.22, ha=align, size=SMALL)
-
-        yield _Row(0.44 + AFTER * (not assumed), draw, joined=assumed)
+        assumed = any(mesh.height_assumed for mesh in content.geometry.occluders)
+        highest = float(content.heights.vmax or 0.0)
+        ticks = tuple(
+            (2.2 * share, 0.22, f"{highest * share:g}{unit}", {"ha": align, "size": SMALL})
+            for share, align, unit in ((0.0, "left", ""), (0.5, "center", ""), (1.0, "right", " m"))
+        )
+        yield _Row(ticks, 0.44 + AFTER * (not assumed), partial(_ramp, content.heights), joined=assumed)
         if assumed:
-            row = self._swatch("height assumed", **ASSUMED_HEIGHT)
-            yield _Row(row.height + AFTER, row.draw)
+            row = self._line("height assumed", partial(_swatch, ASSUMED_HEIGHT))
+            yield replace(row, height=row.height + AFTER)
 
     def _notes(self, notes: Sequence[str]) -> Iterator[_Row]:
         if notes:
@@ -338,43 +317,38 @@ class PlanLegend:
             yield self._small(note[:1].upper() + note[1:])
 
     def _heading(self, words: str, aside: str = "") -> _Row:
-        lines = wrapped(words, self._column_width, HEADING_SIZE, "bold")
+        lines = wrapped(words, self._column, HEADING_SIZE, "bold")
         below = (len(lines) - 1) * LINE
+        texts = [(0.0, n * LINE, line, BOLD | {"size": HEADING_SIZE}) for n, line in enumerate(lines)]
+        return _Row((*texts, (np.inf, 0.0, aside, ASIDE)), HEADING_LINE + below, self._rule(below + 0.14), joined=True)
 
-        def draw(at: _Column) -> None:
-            for number, line in enumerate(lines):
-                at.text(0.0, line, weight="bold", size=HEADING_SIZE, down=number * LINE)
-            at.text(at.width, aside, size=SMALL, color=SOFT_INK, ha="right")
-            at.axes.plot((at.x, at.x + at.width), (at.y + below + 0.14,) * 2, color=SOFT_INK, linewidth=0.6)
+    def _rule(self, down: float) -> Sign:
+        return lambda axes, x, y: axes.plot((x, x + self._column), (y + down,) * 2, color=SOFT_INK, linewidth=0.6)
 
-        return _Row(HEADING_LINE + below, draw, joined=True)
-
-    def _swatch(self, words: str, share: str = "", **style: Any) -> _Row:  # noqa: ANN401 - matplotlib's own
-        return self._line(words, share, lambda at: at.swatch(**style))
-
-    def _marked(self, words: str, mark: Style) -> _Row:
-        return self._line(words, "", lambda at: at.mark(**mark | {"markersize": mark["markersize"] * 1.4}))
-
-    def _line(self, words: str, share: str, sign: Draw) -> _Row:
+    def _line(self, words: str, sign: Sign, share: str = "") -> _Row:
         """Return a row with a sign on the left, words, and a share on the right."""
-        lines = wrapped(words, self._column_width - TEXT_X - (SHARE_ROOM if share else 0.0), SIZE)
-
-        def draw(at: _Column) -> None:
-            sign(at)
-            at.text(at.width, share, ha="right", weight="bold")
-            for number, line in enumerate(lines):
-                at.text(TEXT_X, line, down=number * (LINE - 0.02))
-
-        return _Row(LINE + (len(lines) - 1) * (LINE - 0.02), draw)
+        lines = wrapped(words, self._column - TEXT_X - (SHARE_ROOM if share else 0.0), SIZE)
+        texts: list[tuple[float, float, str, Style]] = [(TEXT_X, n * LINE, line, {}) for n, line in enumerate(lines)]
+        return _Row((*texts, (np.inf, 0.0, share, BOLD)), len(lines) * LINE, sign)
 
     def _small(self, words: str) -> _Row:
-        lines = wrapped(words, self._column_width, SMALL)
+        lines = wrapped(words, self._column, SMALL)
+        return _Row(
+            tuple((0.0, n * SMALL_LINE, line, ASIDE) for n, line in enumerate(lines)), len(lines) * SMALL_LINE + AFTER
+        )
 
-        def draw(at: _Column) -> None:
-            for number, line in enumerate(lines):
-                at.text(0.0, line, down=number * SMALL_LINE, size=SMALL, color=SOFT_INK)
 
-        return _Row(len(lines) * SMALL_LINE + AFTER, draw)
+def _mark(style: Style, axes: Axes, x: float, y: float) -> None:
+    axes.plot(x + 0.12, y, clip_on=False, **style)
+
+
+def _swatch(style: Style, axes: Axes, x: float, y: float) -> None:
+    axes.add_patch(Rectangle((x + 0.02, y - 0.07), 0.2, 0.14, **style))
+
+
+def _ramp(norm: Normalize, axes: Axes, x: float, y: float) -> None:
+    ramp = HEIGHT_CMAP(norm(np.linspace(0.0, float(norm.vmax or 0.0), 128)[None, :]))
+    axes.imshow(ramp, extent=(x, x + 2.2, y + 0.1, y - 0.06), aspect="auto", interpolation="nearest")
 
 
 def _together(rows: list[_Row]) -> list[_Row]:

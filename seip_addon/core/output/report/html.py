@@ -52,7 +52,7 @@ code { display: block; background: #eef1f3; padding: .6em .8em; overflow-wrap: a
   figure > img { max-height: 14cm; }
   figure.tall > img { max-height: 21cm; }
   dl { break-inside: avoid; }
-  header figure > img { max-height: 11cm; }
+  header figure > img { max-height: 9.5cm; }
   section:first-of-type { break-before: page; }
 }
 """
