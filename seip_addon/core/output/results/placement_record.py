@@ -39,8 +39,17 @@ Value = TypeVar("Value")
 
 SCHEMA = "seip-placement/3"
 SHARE_DIGITS = 9
-DIGITS = {"price": 2, "typical": 3, "of_each": 3, "least": 3, "returns": 3}
-"""Decimal places of what is not a share: dollars, and returns to what single precision holds."""
+DIGITS: Mapping[str, int | None] = {
+    **dict.fromkeys(("price_usd", "installation_usd", "price"), 2),  # dollars
+    **dict.fromkeys(("typical", "of_each", "least", "returns"), 3),  # returns, to what single precision holds
+    **dict.fromkeys(("easting_m", "northing_m", "durations_s"), 3),
+    # The micrometre hides the last bits in which platforms differ.
+    **dict.fromkeys(("origin_m", "header_offset_m", "local_m", "map_m", "height_m", "altitude_m"), 6),
+    **dict.fromkeys(("latitude_deg", "longitude_deg"), 8),
+    **dict.fromkeys(("yaw_deg", "tilt_deg", "roll_deg", "header_heading_deg"), None),  # see `headings`
+    **dict.fromkeys(("objective", "value", "bound", "settings", "judgement"), None),
+}
+"""Decimal places of what is not a share; None where numbers stay as they are."""
 
 
 @dataclass(frozen=True)
@@ -371,19 +380,19 @@ def placement_record(
         What the user should know before trusting the figures.
     """
     deployment, placement, greedy = solution.deployment, solution.placement, solution.greedy
-    return PlacementRecord(
+    record = PlacementRecord(
         site=RecordedSite(
-            *(site.name, _metres(site.origin), _geo_reference(site.geo_reference.in_hemisphere(site.origin))),
+            *(site.name, _point(site.origin), _geo_reference(site.geo_reference.in_hemisphere(site.origin))),
             *(site.sources, site.attribution, site.assumptions),
         ),
         sensors=tuple(recorded_sensor(sensor, site) for sensor in deployment.sensors),
-        price_usd=_rounded(deployment.price, 2),
+        price_usd=float(deployment.price),
         coverage=RecordedCoverage(
-            whole=_share(deployment.coverage),
-            central=None if deployment.central is None else _share(deployment.central),
-            weighted=_share(deployment.weighted),
-            seen_twice=_share(deployment.seen_twice),
-            gain_band=_rounded_parts(deployment.gain_band),
+            whole=deployment.coverage,
+            central=deployment.central,
+            weighted=deployment.weighted,
+            seen_twice=deployment.seen_twice,
+            gain_band=deployment.gain_band,
         ),
         objective=RecordedObjective(
             kind="vanilla" if solution.objective.central_weight is None else "weighted",
@@ -404,13 +413,14 @@ def placement_record(
         versions=dict(provenance.versions),
         times=RecordedTimes(
             provenance.created.isoformat(timespec="seconds"),
-            {step: _rounded(seconds, 3) for step, seconds in provenance.durations.items()},
+            provenance.durations,
         ),
-        returns=_rounded_parts(deployment.returns),
-        front=_rounded_parts(tuple(solution.front)),
-        crossings=_rounded_parts(tuple(solution.crossings)),
+        returns=deployment.returns,
+        front=tuple(solution.front),
+        crossings=tuple(solution.crossings),
         judgement=solution.judgement,
     )
+    return _rounded_parts(record)
 
 
 def _without_absent(items: list[tuple[str, Any]]) -> dict[str, Any]:
@@ -423,9 +433,7 @@ _LEFT_OUT = {"roll_deg", "installation_usd", "returns", "judgement"}  # where th
 def _geo_reference(known: GeoReference) -> RecordedGeoReference | None:
     if not known.projection:
         return None
-    return RecordedGeoReference(
-        known.projection, _metres(np.array(known.header_offset[:3])), tilt_degrees(known.header_offset[3])
-    )
+    return RecordedGeoReference(known.projection, _point(known.header_offset[:3]), tilt_degrees(known.header_offset[3]))
 
 
 def recorded_sensor(sensor: Sensor, site: Site) -> RecordedSensor:
@@ -435,32 +443,33 @@ def recorded_sensor(sensor: Sensor, site: Site) -> RecordedSensor:
     map_xyz = sensor.xyz + site.origin
     reference = site.geo_reference.in_hemisphere(site.origin)
     easting, northing = (None, None) if place is None else reference.projected(map_xyz[None])[0, :2]
-    return RecordedSensor(
+    record = RecordedSensor(
         id=sensor.label,
         pose=sensor.pose,
         sensor=sensor.model.key,
         sensor_name=sensor.model.name,
         position=sensor.position_name,
         on_pole=sensor.on_pole,
-        local_m=_metres(sensor.xyz),
-        map_m=_metres(map_xyz),
-        height_m=_rounded(sensor.height, 6),
+        local_m=_point(sensor.xyz),
+        map_m=_point(map_xyz),
+        height_m=sensor.height,
         yaw_deg=degrees(sensor.yaw),
         tilt_deg=tilt_degrees(sensor.tilt),
-        price_usd=_rounded(sensor.price, 2),
-        coverage_alone=_share(sensor.alone),
-        coverage_added=_share(sensor.added),
-        coverage_marginal=_share(sensor.marginal),
+        price_usd=sensor.price,
+        coverage_alone=sensor.alone,
+        coverage_added=sensor.added,
+        coverage_marginal=sensor.marginal,
         roll_deg=tilt_degrees(sensor.roll) if sensor.pose is None else None,
-        latitude_deg=None if latitude is None else _rounded(latitude, 8),
-        longitude_deg=None if longitude is None else _rounded(longitude, 8),
-        altitude_m=None if altitude is None else _rounded(altitude, 6),
-        easting_m=None if easting is None else _rounded(easting, 3),
-        northing_m=None if northing is None else _rounded(northing, 3),
+        latitude_deg=latitude,
+        longitude_deg=longitude,
+        altitude_m=altitude,
+        easting_m=easting,
+        northing_m=northing,
         evidence=sensor.model.evidence,
         all_round=sensor.model.all_round,
-        installation_usd=None if sensor.installation is None else _rounded(sensor.installation, 2),
+        installation_usd=sensor.installation,
     )
+    return _rounded_parts(record)
 
 
 def _sought(solution: Solution) -> Literal["most coverage", "most returns", "least price"]:
@@ -469,20 +478,21 @@ def _sought(solution: Solution) -> Literal["most coverage", "most returns", "lea
     return "most coverage" if solution.deployment.returns is None else "most returns"
 
 
-def _rounded_parts(value: Value, digits: int = SHARE_DIGITS) -> Value:
+def _rounded_parts(value: Value, digits: int | None = SHARE_DIGITS) -> Value:
     """Round all numbers in a dataclass, tuple or mapping: shares, or what `DIGITS` has by its name."""
     rounded: Any = value
+    if digits is None:
+        return value
     if isinstance(value, float):
-        rounded = _rounded(value, digits)
+        rounded = round(float(value), digits) + 0.0  # no negative zero
     elif isinstance(value, tuple):
         rounded = tuple(_rounded_parts(part, digits) for part in value)
     elif isinstance(value, Mapping):
         rounded = {name: _rounded_parts(part, digits) for name, part in value.items()}
     elif is_dataclass(value) and not isinstance(value, type):
-        parts = {each.name: getattr(value, each.name) for each in fields(value)}
-        rounded = replace(
-            value, **{name: _rounded_parts(part, DIGITS.get(name, digits)) for name, part in parts.items()}
-        )
+        own = ((each.name, getattr(value, each.name)) for each in fields(value))
+        parts = {name: _rounded_parts(part, DIGITS.get(name, SHARE_DIGITS)) for name, part in own}
+        rounded = replace(value, **parts)
     return cast("Value", rounded)
 
 
@@ -491,7 +501,7 @@ def _greedy(greedy: Placement, placement: Placement, *, of_returns: bool) -> Rec
         value=_significant(greedy.objective),
         # The better of the two bounds: once the optimum is proven, it no longer depends on a platform's rounding.
         bound=_found(min(greedy.bound, placement.bound)),
-        gap_to_placement=_share(1.0 - share_reached(greedy.objective, placement.objective, of_returns=of_returns)),
+        gap_to_placement=1.0 - share_reached(greedy.objective, placement.objective, of_returns=of_returns),
         poses=tuple(int(pose) for pose in greedy.chosen),
         notes=greedy.notes,
     )
@@ -509,18 +519,9 @@ def _counts(site: Site) -> RecordedCounts:
     )
 
 
-def _metres(point: Float) -> Point:
-    """Round to the micrometre, which hides the last bits in which platforms differ."""
-    x, y, z = (_rounded(value, 6) for value in point)
+def _point(xyz: Iterable[float]) -> Point:
+    x, y, z = map(float, xyz)
     return x, y, z
-
-
-def _share(value: float) -> float:
-    return _rounded(value, SHARE_DIGITS)
-
-
-def _rounded(value: float, digits: int) -> float:
-    return round(float(value), digits) + 0.0  # no negative zero
 
 
 def _significant(value: float) -> float:
