@@ -1,4 +1,4 @@
-"""Charts of average precision against the number, price, coverage and time of a study."""
+"""Charts of average precision against price and coverage."""
 
 import math
 import os
@@ -29,15 +29,12 @@ from seip_addon.core.output.pictures.chart_style import (
     add_legend,
     colour,
     new_figure,
-    save_chart,
     set_title,
     style_axes,
 )
 from seip_addon.core.output.pictures.drawing import save_png
 from seip_addon.core.output.pictures.palette import INK, PAPER, SOFT_INK
 
-TYPE_SHIFT, SEED_SHIFT = 0.09, 0.035  # of the step between two numbers: from type to type, from mark to seeds
-SEED_MARK: dict[str, Any] = {"linestyle": "none", "markersize": 3.4, "alpha": 0.55, "mew": 0.0, "zorder": 2}
 LABEL: dict[str, Any] = {"size": 8.0, "color": INK, "ha": "center", "va": "center", "zorder": 5, "parse_math": False}
 
 
@@ -75,28 +72,6 @@ class PrecisionCell:
     def name(self) -> str:
         """Name in charts."""
         return placement_name(self.count, self.sensor)
-
-
-def save_count_chart(path: str | os.PathLike[str], cells: Sequence[PrecisionCell], title: str) -> None:
-    """Draw average precision against the number of sensors, a line for each type, as PNG.
-
-    Small dots are single seeds, marks their means, bars the intervals of the means.
-    """
-    check_drawn(cells, "average precision against the number of sensors")
-    figure, (panel,) = new_figure(*PANEL_SIZE)
-    counts = sorted({cell.count for cell in cells})
-    sensors = _sensors(cells)
-    for row, sensor in enumerate(sensors):
-        own = sorted((cell for cell in cells if cell.sensor == sensor), key=lambda cell: cell.count)
-        x = [counts.index(cell.count) + TYPE_SHIFT * (row - (len(sensors) - 1) / 2) for cell in own]
-        panel.plot(x, [cell.mean for cell in own], label=sensor, linewidth=1.6, **mark_style(row))
-        for place, cell in zip(x, own, strict=True):
-            _bar(panel, place, cell.interval, row)
-            panel.plot([place + SEED_SHIFT] * len(cell.values), cell.values, color=colour(row), marker="o", **SEED_MARK)
-    panel.set_xticks(range(len(counts)), [f"{count}" for count in counts])
-    panel.set_xlim(-0.4, len(counts) - 0.6)
-    _precision_axis(panel, _reached(cells), "number of sensors N")
-    save_chart(path, figure, title, [panel])
 
 
 def save_price_chart(path: str | os.PathLike[str], cells: Sequence[PrecisionCell], title: str) -> None:

@@ -1,4 +1,4 @@
-"""Verdicts on the paper's claims about detection, 5 to 9, for one site.
+"""Verdicts on the paper's claims about detection, 5 to 8, for one site.
 
 Gains are in points of average precision. All figures are means over the seeds of the training with Student's 95 %
 interval; seeds are compared in pairs. A claim holds if the interval lies within the claimed range, does not hold if it
@@ -47,8 +47,6 @@ class SeedResult:
         False positives per frame, at a score that all results of a training share.
     sparse : float, 0 to 1
         Share of the false positives where the cloud is sparser than around half of the hits; NaN without any.
-    padded : bool
-        Whether empty slots of pillars were fed to the network as points instead of masked: the ablation of claim 9.
     still_rising : bool
         Whether the average precision on validation frames was still rising when the training ended.
     """
@@ -61,32 +59,28 @@ class SeedResult:
     coverage: float
     false_positives: float
     sparse: float
-    padded: bool = False
     still_rising: bool = False
 
 
 def detection_claims(results: Sequence[SeedResult]) -> tuple[Claim, ...]:
-    """Evaluate claims 5 to 9 of the paper on the measurements.
+    """Evaluate claims 5 to 8 of the paper on the measurements.
 
-    Claims for which a type or the ablation is missing are left out.
+    Claims for which a type is missing are left out.
 
     Parameters
     ----------
     results : sequence of SeedResult
         Results with several seeds for each type; types in order from the simplest to the best.
     """
-    masked = [result for result in results if not result.padded]
-    sensors = list(dict.fromkeys(result.sensor for result in masked))
+    sensors = list(dict.fromkeys(result.sensor for result in results))
     claims = [
-        _decided(_gains(number, masked, sensor, published), _of(masked, sensor))
+        _decided(_gains(number, results, sensor, published), _of(results, sensor))
         for number, sensor, published in zip((5, 6), sensors, PUBLISHED_GAINS, strict=False)  # a study may have one
     ]
     if len(sensors) > 1:
-        claims.append(_decided(_simple_sensors_gain_more(masked, sensors), masked))
+        claims.append(_decided(_simple_sensors_gain_more(results, sensors), results))
     if sensors:
-        claims.append(_decided(_false_where_sparse(masked, sensors[0]), _of(masked, sensors[0])))
-    if len(masked) < len(results):
-        claims.append(_decided(_padding(results), results))
+        claims.append(_decided(_false_where_sparse(results, sensors[0]), _of(results, sensors[0])))
     return tuple(claims)
 
 
@@ -103,17 +97,16 @@ def _decided(claim: Claim, results: Sequence[SeedResult]) -> Claim:
 
 
 def _doubts(results: Sequence[SeedResult]) -> Iterator[str]:
-    masked = [one for one in results if not one.padded]
-    cells = {(one.sensor, one.count) for one in masked}
-    reached = (_mean(_by_seed(masked, *cell, lambda one: one.average_precision)).value for cell in cells)
+    cells = {(one.sensor, one.count) for one in results}
+    reached = (_mean(_by_seed(results, *cell, lambda one: one.average_precision)).value for cell in cells)
     best = max(reached, default=0.0)
     if best < LEAST_PRECISION:
         yield (
             f"the detectors reach an AP of {best:.1%} with the best of these placements, and below "
             f"{LEAST_PRECISION:.0%} they support no conclusion about sensors"
         )
-    trainings = {(one.seed, one.padded) for one in results}
-    rising = {(one.seed, one.padded) for one in results if one.still_rising}
+    trainings = {one.seed for one in results}
+    rising = {one.seed for one in results if one.still_rising}
     if rising:
         yield (
             f"validation AP was still rising when {len(rising)} of {len(trainings)} trainings ended: train longer, "
@@ -165,27 +158,6 @@ def _false_where_sparse(results: Sequence[SeedResult], sensor: str) -> Claim:
     )
 
 
-def _padding(results: Sequence[SeedResult]) -> Claim:
-    cells = dict.fromkeys((result.sensor, result.count) for result in results if result.padded)
-    rows, verdicts = [], []
-    for sensor, count in cells:
-        padded, masked = (
-            _by_seed([result for result in results if result.padded == which], sensor, count, _sparse_false_positives)
-            for which in (True, False)
-        )
-        more = _mean(_differences(padded, masked))
-        verdicts.append(_above(more))
-        rows.append(
-            f"{sensor}, N = {count}: {_mean(padded, COUNT).plain()} padded, {_mean(masked, COUNT).plain()} masked"
-        )
-    return Claim(
-        9,
-        "zero-padded pillars cause false positives where the cloud is sparse",
-        worst_verdict(verdicts),
-        f"false positives per frame in the sparser half: {'; '.join(rows)}",
-    )
-
-
 @dataclass(frozen=True)
 class _Mean:
     """Mean over seeds; its interval is None with fewer than `MIN_SEEDS`."""
@@ -234,10 +206,6 @@ def _gain(results: Sequence[SeedResult], sensor: str, few: int, more: int) -> By
 
 def _differences(more: BySeed, less: BySeed) -> BySeed:
     return {seed: more[seed] - less[seed] for seed in more if seed in less}
-
-
-def _sparse_false_positives(result: SeedResult) -> float:
-    return result.false_positives * result.sparse if result.false_positives else 0.0
 
 
 def _per_price(results: Sequence[SeedResult], sensor: str) -> str:
