@@ -115,7 +115,7 @@ recording: detection
 
 detector: detection sumo
 	$(PY) -m headless study random-sites -o out/sites --sites 64 --seed 1
-	$(PY) -m headless study site-training out/sites/site-*/site.blend --field-conditions --placements 2 --seed 7 \
+	$(PY) -m headless study site-training out/sites/site-*/site.blend --placements 2 --seed 7 \
 	  --steps 13381 --batch 64 --patience 50 --device cuda -o out/detector
 	cp out/detector/detector.pt headless/detection/shipped_detector.pt
 
