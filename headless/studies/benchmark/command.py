@@ -1,4 +1,4 @@
-"""Benchmark of visibility, placement and scans against alternatives: a page and a chart.
+"""Benchmark of visibility, placement and scans: a page with speed, gaps to bounds, and growth.
 
 seip study benchmark scenes/junction.blend -o docs
 """
@@ -13,15 +13,9 @@ from functools import partial
 from pathlib import Path
 
 from headless import runtime
-from headless.studies.benchmark.growth import (
-    Growth,
-    corridor_growth,
-    placement_growth,
-    relaxation_growth,
-    visibility_growth,
-)
+from headless.studies.benchmark.growth import Growth, corridor_growth, placement_growth
 from headless.studies.benchmark.placement import METHODS, SolverRun, compare
-from headless.studies.benchmark.report import Findings, requirements, save_growth_chart, save_page
+from headless.studies.benchmark.report import Findings, requirements, save_page
 from headless.studies.benchmark.resource_usage import in_fresh_process
 from headless.studies.benchmark.scans import scan_costs
 from headless.studies.benchmark.street_visibility import street_problem
@@ -72,8 +66,6 @@ class BenchmarkScope:
         Multiples of the size that grows in the street grids.
     copies : tuple of int
         Numbers of copies of the scene in a row.
-    spacings : tuple of float, metres
-        Spacings of the targets.
     scanned_by : str
         Type of the sensors that scan traffic.
     frames : int
@@ -89,7 +81,6 @@ class BenchmarkScope:
     growth_positions: int = 8
     multiples: tuple[int, ...] = (1, 2, 4, 8)
     copies: tuple[int, ...] = (1, 2, 4, 8, 16)
-    spacings: tuple[float, ...] = (4.0, 2.0, 1.0, 0.5)
     scanned_by: str = "type2"
     frames: int = 10
 
@@ -98,16 +89,15 @@ def main(argv: list[str], scope: BenchmarkScope | None = None) -> None:
     """Run the measurements and write the results into a folder; tests pass a small ``scope``."""
     parser = argparse.ArgumentParser(prog="benchmark", description=__doc__.splitlines()[0])
     parser.add_argument("scene", type=Path, help="scene (.blend)")
-    parser.add_argument("-o", "--output", type=Path, required=True, help="folder for benchmark.md and benchmark/")
+    parser.add_argument("-o", "--output", type=Path, required=True, help="folder for benchmark.md")
     options = parser.parse_args(argv)
-    runtime.check_folder(options.output / "benchmark")
+    runtime.check_folder(options.output)
     runtime.open_scene(options.scene)
     findings = measure(read_scene(bpy.context.scene).geometry, scope or BenchmarkScope())
     for one in requirements(findings):
         verdict = "" if one.met else " – NOT MET"
         runtime.print_line(f"{one.quantity}: required {one.required}, measured {one.measured}{verdict}")
     with runtime.incomplete_if_interrupted(options.output):
-        save_growth_chart(options.output / "benchmark" / "growth.png", findings.growths)
         save_page(options.output / "benchmark.md", findings)
     runtime.print_line(f"results: {options.output / 'benchmark.md'}")
 
@@ -120,7 +110,7 @@ def measure(geometry: SceneGeometry, scope: BenchmarkScope) -> Findings:
     LOG.info(f"{site.name}: full and lazy scans from {scope.positions} positions")
     visibility = visibility_costs(site, models, settings, scope.positions)
     runs = [run for instance in placement_runs(site, models, settings, scope) for run in instance]
-    growths = measure_growth(geometry, site, models, settings, scope)
+    growths = measure_growth(site, models, settings, scope)
     LOG.info("scans of traffic")
     scans = scan_costs(site, static_scene(geometry), load_catalogue()[scope.scanned_by], scope.frames)
     setting = {
@@ -130,6 +120,7 @@ def measure(geometry: SceneGeometry, scope: BenchmarkScope) -> Findings:
         "triangles": len(site.triangles),
         "positions": len(sampled_positions(site, scope.positions)),
         "scanned_by": scope.scanned_by,
+        "frames": scope.frames,
         "effort": scope.effort,
         "cores": os.cpu_count(),
         "versions": {name: importlib.metadata.version(name) for name in ("bpy", "numpy", "embreex", "PuLP", "highspy")},
@@ -173,24 +164,17 @@ def placement_runs(
 
 
 def measure_growth(
-    geometry: SceneGeometry,
-    site: Site,
-    models: dict[str, LidarModel],
-    settings: VisibilitySettings,
-    scope: BenchmarkScope,
+    site: Site, models: dict[str, LidarModel], settings: VisibilitySettings, scope: BenchmarkScope
 ) -> list[Growth]:
-    """Measure growth with the targets, with copies of the scene side by side, and in street grids."""
+    """Measure growth with copies of the scene side by side, and in street grids."""
     LOG.info("growth of time and memory, each size in a process of its own")
-    finer = [make_site(geometry, scope.layout, step, fields_of_view=fields_of_view(models)) for step in scope.spacings]
     positions, targets, blocks = scope.street
     more_positions = [(positions * n // scope.multiples[-1], targets, blocks) for n in scope.multiples]
     more_targets = [(positions, targets * n // 2, blocks) for n in scope.multiples]
     return [
-        visibility_growth(finer, models, settings, scope.growth_positions),
         corridor_growth(site, scope.copies, models, settings, scope.growth_positions),
         placement_growth("poses", [(3 * street[0], street) for street in more_positions], scope.effort),
         placement_growth("targets", [(street[1], street) for street in more_targets], scope.effort),
-        relaxation_growth(more_positions),
     ]
 
 

@@ -13,11 +13,8 @@ from headless.studies.benchmark.street_visibility import street_problem
 from headless.studies.benchmark.visibility import sampled_positions
 
 import numpy as np
-import pulp
 
 from seip_addon.core.arrays import Float
-from seip_addon.core.choosing.placement.instance import make_instance
-from seip_addon.core.choosing.placement.integer_program import ConcaveProgram
 from seip_addon.core.sensing.lidar.model import LidarModel
 from seip_addon.core.sensing.visibility.chunks import compute_rows
 from seip_addon.core.sensing.visibility.ray_casting import make_ray_caster
@@ -70,17 +67,6 @@ def growth_exponent(size: Sequence[float], cost: Sequence[float]) -> float:
     return float(slope)
 
 
-def visibility_growth(
-    sites: Sequence[Site], models: Mapping[str, LidarModel], settings: VisibilitySettings, samples: int
-) -> Growth:
-    """Measure visibility at the same number of sampled positions for sites with finer and finer targets."""
-    costs = [
-        (len(site.targets), *in_fresh_process(partial(visibility_cost, site, models, settings, samples)))
-        for site in sites
-    ]
-    return Growth("visibility", "targets", costs)
-
-
 def corridor_growth(
     site: Site, copies: Sequence[int], models: Mapping[str, LidarModel], settings: VisibilitySettings, samples: int
 ) -> Growth:
@@ -109,16 +95,6 @@ def placement_growth(quantity: str, steps: Sequence[tuple[int, tuple[int, int, i
     """
     costs = [(size, *in_fresh_process(partial(placement_cost, *street, effort))) for size, street in steps]
     return Growth(f"placement, N = {STREET_SENSORS}", quantity, costs)
-
-
-def relaxation_growth(streets: Sequence[tuple[int, int, int]]) -> Growth:
-    """Measure the linear relaxation at the root, in street grids of given positions, targets and blocks.
-
-    The constant `integer_program.ROOT_OPERATIONS` comes from this: seconds per squared entry, times
-    ``OPERATIONS_PER_UNIT``.
-    """
-    costs = [in_fresh_process(partial(relaxation_cost, *street)) for street in streets]
-    return Growth("first linear relaxation", "entries of A", costs)
 
 
 def visibility_cost(
@@ -157,19 +133,6 @@ def placement_cost(positions: int, targets: int, blocks: int, effort: float) -> 
     expense = Expense()
     _, memory = peak_memory(partial(expense.time, partial(ours, problem, effort)))
     return expense.cpu, memory
-
-
-def relaxation_cost(positions: int, targets: int, blocks: int) -> MeasuredCost:
-    """Solve the linear relaxation at the root of the integer program of a street grid; see `relaxation_growth`.
-
-    The size is the number of entries of A that remain after the exact reductions.
-    """
-    program = ConcaveProgram(make_instance(street_problem(positions, targets, blocks=blocks, count=STREET_SENSORS)))
-    program.model.setObjective(program.objective)
-    expense = Expense()
-    solver = pulp.HiGHS(mip=False, msg=False, threads=1)
-    _, memory = peak_memory(partial(expense.time, partial(program.model.solve, solver)))
-    return program.entries, expense.cpu, memory
 
 
 def repeated(site: Site, copies: int) -> Site:

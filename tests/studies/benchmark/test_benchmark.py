@@ -1,4 +1,4 @@
-"""The benchmark writes its page and chart, its methods keep to the rules, and its requirements are strict."""
+"""The benchmark writes its page, its methods keep to the rules, and its requirements are strict."""
 
 import math
 import re
@@ -10,7 +10,6 @@ from headless.studies.benchmark.growth import growth_exponent
 from headless.studies.benchmark.placement import METHODS, SolverRun, compare
 from headless.studies.benchmark.report import Findings, requirements
 from headless.studies.benchmark.resource_usage import Expense
-from headless.studies.benchmark.scans import ScanCost
 from headless.studies.benchmark.street_visibility import street_problem
 from headless.studies.benchmark.visibility import Cost
 
@@ -31,26 +30,22 @@ SMALL = BenchmarkScope(
     growth_positions=1,
     multiples=(1, 2),
     copies=(1, 2),
-    spacings=(8.0, 4.0),
     scanned_by="type1",
     frames=1,
 )
 
 
 @pytest.mark.slow
-def test_the_page_has_every_method_and_its_chart(small_scene, tmp_path):
+def test_the_page_has_every_method(small_scene, tmp_path):
     pytest.importorskip("embreex", reason="embreex is not installed")
     benchmark.main([str(small_scene), "-o", str(tmp_path)], SMALL)
     page = (tmp_path / "benchmark.md").read_text(encoding="utf-8")
-    assert "(benchmark/growth.png)" in page
-    assert (tmp_path / "benchmark" / "growth.png").read_bytes().startswith(b"\x89PNG")
-    assert len(re.findall(r"\| (?:met|\*\*not met\*\*) \|", page)) == 9
-    for method in ("full bvh", "lazy bvh", "full embree", "lazy embree", "cached bvh", "cached embree"):
+    assert len(re.findall(r"\| (?:met|\*\*not met\*\*) \|", page)) == 6
+    for method in ("full bvh", "lazy bvh", "full embree", "lazy embree", "bvh", "embree"):
         assert f"\n| {method} | " in page
     for method in METHODS:
         assert f"60 × 200, N = 3 | {method} | " in page
-    assert " of 240,000 |" in page
-    for task in ("visibility", "visibility of a corridor", "placement, N = 4", "first linear relaxation"):
+    for task in ("visibility of a corridor", "placement, N = 4"):
         assert f"\n| {task} | " in page
 
 
@@ -83,20 +78,13 @@ def test_requirements_are_met_only_by_what_meets_them():
         run_of("many", "ours", 59.0, 991.0, 1000.0),
         run_of("largest", "ours", 119.0, 984.0, 1000.0),
     ]
-    scans = {
-        "cached bvh": ScanCost(Expense(7.0), 10, 1_000_000, 1),
-        "full bvh": ScanCost(Expense(100.0), 10, 1_000_000),
-        "cached embree": ScanCost(Expense(5.0), 10, 1_000_000, 0),
-    }
-    findings = Findings({}, visibility, runs, [], scans)
+    findings = Findings({}, visibility, runs, [], {})
     checks = requirements(findings)
-    assert [check.met for check in checks] == [True, True, False, True, True, False, False, True, True]
+    assert [check.met for check in checks] == [True, True, False, True, True, False]
     assert checks[2].measured == "9×"
     runs[1] = run_of("few", "PuLP + CBC", 30.0, 901.0, math.inf)  # better than what was said to be proven
-    scans["cached bvh"].differing = 2
     checks = requirements(replace(findings, runs=runs))
     assert not checks[3].met
-    assert not checks[8].met
 
 
 @given(st.floats(-2, 3), st.floats(0.1, 10))
