@@ -10,8 +10,7 @@ from headless.detection.recordings import Simulator
 from headless.detection.rules import MAIN_RULE, RULES, precisions
 from headless.detection_results import error_view
 from headless.studies.mean_over_seeds import mean_interval
-from headless.studies.precision_charts import PrecisionCell, save_coverage_chart, save_price_chart
-from headless.studies.rank_correlation import rank_correlation, rank_correlation_interval
+from headless.studies.rank_correlation import rank_agreements
 
 import numpy as np
 
@@ -19,6 +18,7 @@ from seip_addon.core.estimates import SHARE, Interval
 from seip_addon.core.storage.csv_table import save_csv
 
 from .case_study import DetectorOutcome, Traffic
+from .price_chart import PrecisionCell, save_price_chart
 
 _NO_ENDS = (math.nan, math.nan)
 
@@ -48,17 +48,10 @@ class StudyResults:
             )
         return tuple(cells)
 
-    @property
-    def correlation(self) -> tuple[float, Interval | None]:
-        """Rank correlation of coverage and average precision over the configurations, with its interval."""
-        coverage, precision = [cell.coverage for cell in self.cells], [cell.mean for cell in self.cells]
-        return rank_correlation(coverage, precision), rank_correlation_interval(coverage, precision, seed=0)
-
 
 def save_charts(folder: Path, results: StudyResults) -> None:
     """Draw every chart of the study into a folder."""
     save_price_chart(folder / "ap_by_price.png", results.cells, results.name)
-    save_coverage_chart(folder / "ap_by_coverage.png", results.cells, *results.correlation, results.name)
     first = [one for one in results.outcomes if one.seed == 1]
     for sensor in dict.fromkeys(one.configuration.sensor for one in first):
         own = [one for one in first if one.configuration.sensor == sensor]
@@ -123,10 +116,8 @@ def describe(results: StudyResults) -> Iterator[str]:
             f"coverage {cell.coverage:.1%}, ${cell.price:,.0f}"
         )
         yield f"  {_by_rules(results, cell.name)}"
-    correlation, interval = results.correlation
-    between = "" if interval is None else f" ({interval[0]:.2f} to {interval[1]:.2f})"
-    found = f"{correlation:.2f}{between}" if math.isfinite(correlation) else "undefined, as all values are equal"
-    yield f"rank correlation of coverage and AP: {found}"
+    coverage, precision = np.array([(cell.coverage, cell.mean) for cell in results.cells]).T
+    yield f"rank correlation of coverage and AP: {rank_agreements(coverage, precision)[0]:.2f}"
 
 
 def _by_rules(results: StudyResults, name: str) -> str:

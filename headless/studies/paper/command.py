@@ -34,7 +34,6 @@ from headless.studies.paper.traffic_runs import (
     overlaps,
     read_traffic_of_site,
 )
-from headless.studies.precision_charts import save_coverage_chart
 
 import bpy
 import numpy as np
@@ -49,11 +48,8 @@ from seip_addon.core.sumo_programs import find_sumo
 from seip_addon.core.workflows.survey import Survey
 from seip_addon.scene.read import read_scene
 
-CHARTS = {
-    "pictures/paper_heights.png": "Coverage by type, height and number",
-    "pictures/paper_coverage_and_ap.png": "Average precision against coverage",
-}
-"""Captions of the charts by their paths from the page."""
+CHART = "pictures/paper_heights.png"
+"""Chart of coverage by type, height and number, as seen from the page."""
 
 
 def main(argv: list[str]) -> None:
@@ -83,10 +79,8 @@ def main(argv: list[str]) -> None:
     claims = (*coverage_claims(study), *detection_claims([one.seed_result for one in results.outcomes]))
     facts = _facts(surveyed, traffic, runs, training, options)
     with runtime.incomplete_if_interrupted(options.output):
-        heights, precision = (options.output / path for path in CHARTS)
-        save_height_chart(heights, study, results.name)
-        save_coverage_chart(precision, results.cells, *results.correlation, results.name)
-        text = page(_command(options), facts, study, claims, _figures(results), CHARTS)
+        save_height_chart(options.output / CHART, study, results.name)
+        text = page(_command(options), facts, study, claims, _figures(results), CHART)
         with whole_file(options.output / "paper.md") as temporary:
             temporary.write_text(text, encoding="utf-8")
     for claim in sorted(claims, key=lambda claim: claim.number):

@@ -49,7 +49,7 @@ def page(
     study: CoverageStudy,
     claims: Sequence[Claim],
     placements: Sequence[PlacementFigures],
-    charts: Mapping[str, str],
+    chart: str,
 ) -> str:
     """Return the page.
 
@@ -61,8 +61,8 @@ def page(
         Entries of the table of differences: ``scene``, ``criterion``, ``traffic`` and ``training``.
     claims : sequence of Claim
         Claims about coverage and about detection.
-    charts : mapping of str to str
-        Caption of each chart, by its path from the page.
+    chart : str
+        Path of the chart of coverage from the page.
     """
     parts = [
         "# The paper's own case",
@@ -72,7 +72,7 @@ def page(
         "## Figures",
         "The paper's plots are pictures without values; figures from its text are next to ours.",
         *_figures(study, placements),
-        *(f"![{caption}]({path})\n\n{caption}" for path, caption in charts.items()),
+        f"![Coverage by type, height and number]({chart})",
         "## What differs",
         _table(
             ("", "the paper", "here"),

@@ -74,7 +74,7 @@ def test_the_page_is_written_with_its_charts(run, network, tmp_path, capsys):
     assert str(tmp_path) not in text
     assert "validation AP was still rising" in text
     pictures = re.findall(r"!\[.*?\]\((.*?)\)", text)
-    assert len(pictures) == 2
+    assert len(pictures) == 1
     assert all(imread(tmp_path / "docs" / picture).shape[1] > 600 for picture in pictures)
     said = capsys.readouterr().out
     assert "claim 8 (" in said

@@ -53,8 +53,7 @@ CLAIMS = (
 
 
 def made():
-    charts = {"pictures/a.png": "A chart"}
-    return page("seip study paper Town.xodr", FACTS, study(), CLAIMS, PLACEMENTS, charts)
+    return page("seip study paper Town.xodr", FACTS, study(), CLAIMS, PLACEMENTS, "pictures/a.png")
 
 
 def rows(text, first):

@@ -1,4 +1,4 @@
-"""Charts of average precision against price and coverage."""
+"""Chart of average precision against price."""
 
 import math
 import os
@@ -78,8 +78,15 @@ def save_price_chart(path: str | os.PathLike[str], cells: Sequence[PrecisionCell
     """Draw average precision against price, with the front named, as PNG."""
     check_drawn(cells, "average precision against price")
     figure, (panel,) = new_figure(PANEL_SIZE[0] * 1.25, PANEL_SIZE[1])
+    for row, sensor in enumerate(dict.fromkeys(cell.sensor for cell in cells)):
+        own = [cell for cell in cells if cell.sensor == sensor]
+        for cell in own:
+            if cell.interval is not None:
+                style: dict[str, Any] = {"color": colour(row), "linewidth": 1.1, "marker": "_", "markersize": 5}
+                panel.plot((cell.price, cell.price), cell.interval, zorder=3, **style)
+        prices, means = [cell.price for cell in own], [cell.mean for cell in own]
+        panel.plot(prices, means, label=sensor, linestyle="none", **mark_style(row))
     best = _front(cells)
-    _scatter(panel, cells, [cell.price for cell in cells])
     panel.step(
         [cell.price for cell in best],
         [cell.mean for cell in best],
@@ -97,60 +104,15 @@ def save_price_chart(path: str | os.PathLike[str], cells: Sequence[PrecisionCell
     prices = [cell.price for cell in cells]
     ticks = [step * 10.0**decade for decade in range(7) for step in (1, 2, 5)]
     panel.set_xticks([tick for tick in ticks if min(prices) / 1.5 <= tick <= max(prices) * 1.5])
-    _precision_axis(panel, _reached(cells), "price of all sensors")
+    # Scaled to the values: on an axis from 0, differences near 1 would not be visible.
+    reached = [value for cell in cells for value in (*cell.values, *(cell.interval or ()))]
+    lowest = min(value for value in reached if math.isfinite(value))
+    panel.set_ylim(max(0.0, math.floor(10 * lowest - 0.3) / 10), 1.005 if max(reached) <= 1 else None)
+    style_axes(panel, "price of all sensors", PRECISION_LABEL, "y")
     add_legend(figure, [panel])
     set_title(figure, title)
-    _name(figure, panel, [(cell.price, cell.mean, cell.name, cell in best) for cell in cells])
+    _name(figure, panel, cells, best)
     save_png(path, figure)
-
-
-def save_coverage_chart(
-    path: str | os.PathLike[str],
-    cells: Sequence[PrecisionCell],
-    correlation: float,
-    interval: Interval | None,
-    title: str,
-) -> None:
-    """Draw average precision against coverage, with their rank correlation, as PNG.
-
-    Parameters
-    ----------
-    correlation : float
-        Spearman's rank correlation of coverage and mean average precision.
-    interval : (float, float) or None
-        Its 95 % interval, where there is one.
-    """
-    check_drawn(cells, "average precision against coverage")
-    figure, (panel,) = new_figure(*PANEL_SIZE)
-    _scatter(panel, cells, [cell.coverage for cell in cells])
-    panel.margins(x=0.1)
-    panel.xaxis.set_major_formatter(FuncFormatter(lambda share, _: f"{100 * share:.0f} %"))
-    _precision_axis(panel, _reached(cells), "coverage: share of the road that the placement sees")
-    between = "" if interval is None else f" ({interval[0]:.2f} to {interval[1]:.2f})"
-    panel.set_title(f"rank correlation ρ = {correlation:.2f}{between}", color=SOFT_INK, fontsize=9.5)
-    add_legend(figure, [panel])
-    set_title(figure, title)
-    _name(figure, panel, [(cell.coverage, cell.mean, cell.name, False) for cell in cells])
-    save_png(path, figure)
-
-
-def _sensors(cells: Sequence[PrecisionCell]) -> list[str]:
-    return list(dict.fromkeys(cell.sensor for cell in cells))
-
-
-def _scatter(panel: Axes, cells: Sequence[PrecisionCell], x: Sequence[float]) -> None:
-    """Mark each cell's mean with its interval, a colour and a mark for each type."""
-    for row, sensor in enumerate(_sensors(cells)):
-        own = [(place, cell) for place, cell in zip(x, cells, strict=True) if cell.sensor == sensor]
-        for place, cell in own:
-            _bar(panel, place, cell.interval, row)
-        places, means = [place for place, _ in own], [cell.mean for _, cell in own]
-        panel.plot(places, means, label=sensor, linestyle="none", **mark_style(row))
-
-
-def _bar(panel: Axes, x: float, interval: Interval | None, row: int) -> None:
-    if interval is not None:
-        panel.plot((x, x), interval, color=colour(row), linewidth=1.1, marker="_", markersize=5, zorder=3)
 
 
 def _front(cells: Sequence[PrecisionCell]) -> list[PrecisionCell]:
@@ -162,25 +124,17 @@ def _front(cells: Sequence[PrecisionCell]) -> list[PrecisionCell]:
     return best
 
 
-def _reached(cells: Sequence[PrecisionCell]) -> list[float]:
-    return [value for cell in cells for value in (*cell.values, *(cell.interval or ()))]
-
-
-def _precision_axis(panel: Axes, reached: Sequence[float], x: str) -> None:
-    """Scale the axis to the values; on an axis from 0, differences near 1 would not be visible."""
-    lowest = min(value for value in reached if math.isfinite(value))
-    panel.set_ylim(max(0.0, math.floor(10 * lowest - 0.3) / 10), 1.005 if max(reached) <= 1 else None)
-    style_axes(panel, x, PRECISION_LABEL, "y")
-
-
-def _name(figure: Figure, panel: Axes, named: Sequence[tuple[float, float, str, bool]]) -> None:
-    """Write names (x, y, name, whether highlighted) next to their marks, without overlaps."""
+def _name(figure: Figure, panel: Axes, cells: Sequence[PrecisionCell], best: Sequence[PrecisionCell]) -> None:
+    """Write the name of each cell next to its mark, without overlaps; those of the front in bold."""
     figure.draw_without_rendering()  # fixes the positions and limits of panels, which names are placed by
     figure.set_layout_engine("none")
-    texts = [panel.text(x, y, words, weight="bold" if out else "normal", **LABEL) for x, y, words, out in named]
+    texts = [
+        panel.text(cell.price, cell.mean, cell.name, weight="bold" if cell in best else "normal", **LABEL)
+        for cell in cells
+    ]
     extents = [text.get_window_extent() for text in texts]
     sizes = np.array([(extent.width, extent.height) for extent in extents])
-    points = panel.transData.transform([(x, y) for x, y, _, _ in named])
+    points = panel.transData.transform([(cell.price, cell.mean) for cell in cells])
     radius, frame = 4.0 * figure.dpi / 72, panel.get_window_extent()
     lines = np.concatenate([_along(panel, line) for line in panel.get_lines()])
     centres = place_callouts(points, sizes, frame.extents, radius, lines)
