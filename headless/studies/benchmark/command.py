@@ -7,7 +7,6 @@ import argparse
 import importlib.metadata
 import logging
 import os
-from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -109,7 +108,7 @@ def measure(geometry: SceneGeometry, scope: BenchmarkScope) -> Findings:
     site = make_site(geometry, scope.layout, fields_of_view=fields_of_view(models))
     LOG.info(f"{site.name}: full and lazy scans from {scope.positions} positions")
     visibility = visibility_costs(site, models, settings, scope.positions)
-    runs = [run for instance in placement_runs(site, models, settings, scope) for run in instance]
+    runs = placement_runs(geometry, settings, scope)
     growths = measure_growth(site, models, settings, scope)
     LOG.info("scans of traffic")
     scans = scan_costs(site, static_scene(geometry), load_catalogue()[scope.scanned_by], scope.frames)
@@ -128,38 +127,28 @@ def measure(geometry: SceneGeometry, scope: BenchmarkScope) -> Findings:
     return Findings(setting, visibility, runs, growths, scans)
 
 
-def placement_runs(
-    site: Site, models: dict[str, LidarModel], settings: VisibilitySettings, scope: BenchmarkScope
-) -> list[list[SolverRun]]:
-    """Compare placement methods on the scene's site, in street grids, and in the largest street grid."""
-    first = site.candidates.sensor[0]
-    own = site.candidates.sensor == first
+def placement_runs(geometry: SceneGeometry, settings: VisibilitySettings, scope: BenchmarkScope) -> list[SolverRun]:
+    """Compare placement methods for the scene's first type, in street grids, and in the largest street grid."""
+    first = scope.layout.sensors[0]
+    models = find_models(load_catalogue(), [first])
+    layout = replace(scope.layout, sensors=(first,))
+    site = make_site(geometry, layout, fields_of_view=fields_of_view(models))
     visible = finish(compute_visibility(site, models, settings)).visible
     problem = placement_problem(site, visible, models, Objective(count=SITE_SENSORS))
-    problem = replace(
-        problem,
-        amounts=visible[own],
-        prices=problem.prices[own],
-        positions=problem.positions[own],
-        xyz=problem.xyz[own],
-        labels=problem.labels[own],
-        mandatory=None,
-        mandatory_names=None,
-        forbidden=None,
-    )
-    runs = [compare(f"{site.name}, {first}, N = {SITE_SENSORS}", problem, list(METHODS), scope.effort)]
-    _log(runs[-1])
+    problem = replace(problem, mandatory=None, mandatory_names=None, forbidden=None)  # which plain methods do not know
+    runs = compare(f"{site.name}, {first}, N = {SITE_SENSORS}", problem, list(METHODS), scope.effort)
     for count in scope.counts:
         positions, targets, blocks = scope.street
         street = street_problem(positions, targets, blocks=blocks, count=count)
-        runs.append(compare(_street_name(scope.street, count), street, list(METHODS), scope.effort))
-        _log(runs[-1])
+        runs += compare(_street_name(scope.street, count), street, list(METHODS), scope.effort)
     positions, targets, blocks = scope.largest
     street = street_problem(positions, targets, blocks=blocks, count=scope.counts[-1])
     name = _street_name(scope.largest, scope.counts[-1])
     # in a process of its own: a requirement limits its memory, and memory of earlier work would hide a part
-    runs.append(in_fresh_process(partial(compare, name, street, LARGEST_METHODS, 2 * scope.effort)))
-    _log(runs[-1])
+    runs += in_fresh_process(partial(compare, name, street, LARGEST_METHODS, 2 * scope.effort))
+    for run in runs:
+        seconds = f"{run.expense.cpu:>8.2f} s of CPU"
+        LOG.info(f"{run.instance}: {run.method:<13}{run.objective:>10.0f} ≤ {run.bound:<10.1f}{seconds}")
     return runs
 
 
@@ -176,12 +165,6 @@ def measure_growth(
         placement_growth("poses", [(3 * street[0], street) for street in more_positions], scope.effort),
         placement_growth("targets", [(street[1], street) for street in more_targets], scope.effort),
     ]
-
-
-def _log(runs: Sequence[SolverRun]) -> None:
-    for run in runs:
-        seconds = f"{run.expense.cpu:>8.2f} s of CPU"
-        LOG.info(f"{run.instance}: {run.method:<13}{run.objective:>10.0f} ≤ {run.bound:<10.1f}{seconds}")
 
 
 def _street_name(street: tuple[int, int, int], count: int) -> str:

@@ -14,25 +14,25 @@ from pathlib import Path
 from headless import build_scene, runtime
 from headless.detection.average_precision import average_precision_interval
 from headless.detection.settings import TrainingSettings
-from headless.options import new_parser
+from headless.options import new_parser, real_number, whole_number
 from headless.studies.coverage.cells import COUNTS, CoverageStudy, coverage_study
 from headless.studies.coverage.charts import save_height_chart
 from headless.studies.coverage.claims import coverage_claims
 from headless.studies.detection import command as detection
+from headless.studies.detection.case_study import MIN_RUNS
 from headless.studies.detection.claims import detection_claims
 from headless.studies.detection.results import StudyResults
 from headless.studies.detection.sensor_configuration import SensorConfiguration
 from headless.studies.paper.page import PlacementFigures, page
 from headless.studies.paper.published import HEIGHTS
+from headless.studies.paper.route_file import RouteDemand
 from headless.studies.paper.traffic_runs import (
     MOST_OVERLAP,
     WARM_UP,
-    RunSettings,
-    SiteTraffic,
     TrafficSource,
     make_runs,
     overlaps,
-    read_traffic_of_site,
+    read_demand_of_site,
 )
 
 import bpy
@@ -40,6 +40,7 @@ import numpy as np
 
 from seip_addon.core.counts import counted
 from seip_addon.core.errors import SeipError
+from seip_addon.core.limits import Limits
 from seip_addon.core.sensing.traffic.run_overlap import MATCH_RADIUS
 from seip_addon.core.site.candidates import PAPER_TYPES
 from seip_addon.core.site.scene_geometry import SceneGeometry
@@ -56,7 +57,6 @@ def main(argv: list[str]) -> None:
     """Build the scene, draw traffic, place, train, evaluate, and write the page."""
     options = _parser().parse_args(argv)
     training = TrainingSettings() if options.steps is None else TrainingSettings(steps=options.steps)
-    settings = RunSettings(options.runs, options.duration)
     find_sumo()
     for path in (options.map, options.routes, *options.types, options.network):
         if not path.is_file():
@@ -67,8 +67,8 @@ def main(argv: list[str]) -> None:
     scene = options.work / "site.blend"
     geometry = _built(options, scene)
     source = TrafficSource(options.routes, tuple(options.types), options.network)
-    traffic = runtime.finish_with_bar(read_traffic_of_site(source, geometry, options.map.name))
-    runs = runtime.finish_with_bar(make_runs(scene, traffic, geometry, settings))
+    demand = runtime.finish_with_bar(read_demand_of_site(source, geometry, options.map.name))
+    runs = runtime.finish_with_bar(make_runs(scene, source, demand, geometry, options.runs, options.duration))
     site = detection.prepare_site(_detection_options(options, scene, runs))
     surveyed, watch = site.surveyed, site.stopwatch
     limits = surveyed.settings.limits
@@ -77,7 +77,7 @@ def main(argv: list[str]) -> None:
         site, _placements(study), options.work, training=training, seeds=options.trainings, device=options.device
     )
     claims = (*coverage_claims(study), *detection_claims([one.seed_result for one in results.outcomes]))
-    facts = _facts(surveyed, traffic, runs, training, options)
+    facts = _facts(surveyed, demand, runs, training, options)
     with runtime.incomplete_if_interrupted(options.output):
         save_height_chart(options.output / CHART, study, results.name)
         text = page(_command(options), facts, study, claims, _figures(results), CHART)
@@ -140,10 +140,10 @@ def _command(options: argparse.Namespace) -> str:
 
 
 def _facts(
-    surveyed: Survey, traffic: SiteTraffic, runs: list[Path], training: TrainingSettings, options: argparse.Namespace
+    surveyed: Survey, demand: RouteDemand, runs: list[Path], training: TrainingSettings, options: argparse.Namespace
 ) -> dict[str, str]:
     """Return the entries of the table of differences."""
-    geometry, demand, shares = surveyed.geometry, traffic.demand, overlaps(runs)
+    geometry, shares = surveyed.geometry, overlaps(runs)
     hidden = (
         f"{len(geometry.occluders)} objects block the view" if geometry.occluders else "nothing on it blocks the view"
     )
@@ -153,19 +153,17 @@ def _facts(
         "criterion": f"δ = {surveyed.settings.visibility.delta:g} m, a grid of "
         f"{surveyed.settings.grid_spacing:g} m, {len(surveyed.site.candidates.position)} positions on pavements and "
         "poles",
-        "traffic": f"only SUMO, {demand.rate:,.0f} vehicles per hour ({traffic.through:,.0f} through the junction) in "
-        f"{len(demand.flows)} flows; departures, routes, lanes, {len(demand.models)} models and gaps are drawn "
-        f"randomly for each of {options.runs} runs of {options.duration:g} s, after a warm-up of at least "
-        f"{WARM_UP:g} s; {max(shares, default=0.0):.0%} of the vehicles of a run or less are within "
-        f"{MATCH_RADIUS:g} m of a vehicle of another run at the same instant (runs above {MOST_OVERLAP:.0%} are drawn "
-        "again)",
+        "traffic": f"only SUMO, {demand.rate:,.0f} vehicles per hour in {len(demand.flows)} flows; departures, routes, "
+        f"lanes, {len(demand.models)} models and gaps are drawn randomly for each of {options.runs} runs of "
+        f"{options.duration:g} s, after a warm-up of at least {WARM_UP:g} s; {max(shares, default=0.0):.0%} of the "
+        f"vehicles of a run or less are within {MATCH_RADIUS:g} m of a vehicle of another run at the same instant "
+        f"(runs above {MOST_OVERLAP:.0%} are drawn again)",
         "training": f"{training.steps} steps on frames {options.every:g} s apart, "
         f"{counted(options.trainings, 'training')}",
     }
 
 
 def _parser() -> argparse.ArgumentParser:
-    runs = RunSettings()
     parser = new_parser(
         "study paper", "Reproduce the paper's case study on your map and traffic, and compare the figures."
     )
@@ -193,7 +191,11 @@ def _parser() -> argparse.ArgumentParser:
         metavar="UNITS",
         help="limit of the search for each placement, in counted work",
     )
-    parser.add_argument("--runs", type=int, default=runs.runs, metavar="N", help="number of runs of traffic")
-    parser.add_argument("--duration", type=float, default=runs.duration, metavar="S", help="duration of each run")
+    parser.add_argument(
+        "--runs", type=whole_number(Limits(MIN_RUNS, 999)), default=16, metavar="N", help="number of runs of traffic"
+    )
+    parser.add_argument(
+        "--duration", type=real_number(Limits(3, 3600)), default=40.0, metavar="S", help="duration of each run, seconds"
+    )
     detection.add_training_options(parser.add_argument_group("detection"))
     return parser

@@ -43,41 +43,10 @@ class TrafficSource:
     network: Path
 
 
-@dataclass(frozen=True)
-class RunSettings:
-    """Number of the runs of traffic, and their duration in seconds."""
-
-    runs: int = 16
-    duration: float = 40.0
-
-    def __post_init__(self) -> None:
-        if not 4 <= self.runs <= 999:
-            raise SeipError(f"--runs must be 4 to 999 runs of traffic, not {self.runs}")
-        if not 3.0 <= self.duration <= 3600.0:
-            raise SeipError("a run lasts 3 to 3600 s (--duration)")
-
-
-@dataclass(frozen=True, eq=False)
-class SiteTraffic:
-    """Demand that goes through a site.
-
-    Parameters
-    ----------
-    demand : RouteDemand
-        All flows of the file.
-    through : float, vehicles per hour
-        Rate of the flows that cross the region from one of its streets to another.
-    """
-
-    source: TrafficSource
-    demand: RouteDemand
-    through: float
-
-
-def read_traffic_of_site(
+def read_demand_of_site(
     source: TrafficSource, geometry: SceneGeometry, map_name: str
-) -> Generator[Progress, None, SiteTraffic]:
-    """Read the demand, and check that it is of this place.
+) -> Generator[Progress, None, RouteDemand]:
+    """Read the demand, and check that it is of this site.
 
     Raises
     ------
@@ -102,13 +71,12 @@ def read_traffic_of_site(
                 f"{source.routes.name}: flow {flow.name!r} takes the edge {unknown[0]!r}, which "
                 f"{source.network.name} does not have: name the network that the routes were made for"
             )
-    through = [flow.rate for flow in demand.flows if _crosses(flow.edges, network, geometry, shift)]
-    if not through:
+    if not any(_crosses(flow.edges, network, geometry, shift) for flow in demand.flows):
         raise SeipError(
             f"no flow of {source.routes.name} goes through the region of {geometry.name}: name routes through its "
             "junction, or another --junction"
         )
-    return SiteTraffic(source, demand, sum(through))
+    return demand
 
 
 def _share_on_road(network: StreetNetwork, geometry: SceneGeometry, shift: Float) -> float | None:
@@ -131,12 +99,19 @@ def _crosses(edges: Sequence[str], network: StreetNetwork, geometry: SceneGeomet
     return any(shapely.contains_xy(geometry.region, *end) for end in ends)
 
 
-def make_runs(
-    scene: Path, traffic: SiteTraffic, geometry: SceneGeometry, settings: RunSettings
+def make_runs(  # inputs and sizes of the runs
+    scene: Path, source: TrafficSource, demand: RouteDemand, geometry: SceneGeometry, runs: int, duration: float
 ) -> Generator[Progress, None, list[Path]]:
     """Simulate runs into the folder next to a scene's file.
 
     A run is simulated again with other seeds while it overlaps an earlier one by more than `MOST_OVERLAP`.
+
+    Parameters
+    ----------
+    runs : int
+        Number of runs.
+    duration : float, seconds
+        Duration of each run.
 
     Returns
     -------
@@ -151,13 +126,13 @@ def make_runs(
     folder = traffic_folder(scene)
     folder.mkdir(parents=True, exist_ok=True)
     earlier: list[VehiclePositions] = []
-    paths = [folder / f"run-{number}.npz" for number in range(1, settings.runs + 1)]
+    paths = [folder / f"run-{number}.npz" for number in range(1, runs + 1)]
     for number, path in enumerate(paths, start=1):
-        progress = Progress(number - 1, settings.runs, f"run {number}")
+        progress = Progress(number - 1, runs, f"run {number}")
         drawn: list[tuple[float, int, Trajectories, VehiclePositions]] = []
         for draw in range(MAX_DRAWS):
             seed = MAX_DRAWS * number + draw
-            run = yield from within(progress, _simulated(folder, traffic, geometry, settings, seed))
+            run = yield from within(progress, _simulated(folder, source, demand, geometry, seed, duration))
             own = vehicle_positions(path.stem, run)
             overlap = max((overlap_of(own, other) or 0.0 for other in earlier), default=0.0)
             drawn.append((overlap, draw, run, own))
@@ -169,17 +144,17 @@ def make_runs(
     return paths
 
 
-def _simulated(
-    folder: Path, traffic: SiteTraffic, geometry: SceneGeometry, settings: RunSettings, seed: int
+def _simulated(  # as above
+    folder: Path, source: TrafficSource, demand: RouteDemand, geometry: SceneGeometry, seed: int, duration: float
 ) -> Generator[Progress, None, Trajectories]:
     begin = WARM_UP + float(np.random.default_rng([seed, 5]).integers(SIGNAL_CYCLE))
-    end = begin + settings.duration
+    end = begin + duration
     routes, recorded = folder / "run.rou.xml", folder / "run.fcd.xml"
-    files = TrafficFiles(recorded, (routes,), traffic.source.network)
+    files = TrafficFiles(recorded, (routes,), source.network)
     try:
-        write_run(routes, traffic.demand, seed, end)
+        write_run(routes, demand, seed, end)
         yield from run_sumo(find_sumo(), files, seed, end)
-        origin = f"SUMO, demand of {traffic.source.routes.name}, seed {seed}"
+        origin = f"SUMO, demand of {source.routes.name}, seed {seed}"
         run = yield from recorded_run(files, (begin, end), geometry, origin)
     finally:
         for path in (routes, recorded):
