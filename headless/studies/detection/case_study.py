@@ -14,15 +14,14 @@ from headless.detection.average_precision import ADVISED_TEST_RUNS, Evaluation, 
 from headless.detection.detector import Detector
 from headless.detection.detector_evaluation import AT_ONCE, detect_in_runs, side_by_side
 from headless.detection.frame_results import FrameResult
-from headless.detection.frames import SampledRecording
-from headless.detection.recordings import SampledRun, Simulator, sampled_runs
+from headless.detection.frames import LazyFrames, Recording, SampledRecording
+from headless.detection.recordings import MountedSensors, SampledRun, Simulator, poses_key, sampled_runs
 from headless.detection.rules import MAIN_RULE
 from headless.detection.settings import NetworkSettings, TrainingSettings
 from headless.detection.training import LearningCurve, TrainedDetector, deterministic, train
 from headless.studies.coverage.cells import COUNTS, Case, Cell, solve_cell
 from headless.studies.detection.sensor_configuration import SensorConfiguration
 from headless.studies.false_positives import false_positives
-from headless.studies.simulated_recordings import recorded
 
 from seip_addon.core.arrays import Float
 from seip_addon.core.errors import SeipError
@@ -204,6 +203,13 @@ def most_rays_first(configurations: Iterable[SensorConfiguration]) -> list[Senso
         return sum(sensor.model.channels * sensor.model.azimuth_count for sensor in placed.sensors)
 
     return sorted(configurations, key=rays, reverse=True)
+
+
+def recorded(simulator: Simulator, configuration: MountedSensors, run: SampledRun) -> Recording:
+    """Return the frames of a run, simulated on access."""
+    frames = LazyFrames(len(run.times), lambda number: simulator.frame(configuration, run, number))
+    name = f"{configuration.name} in {run.name}"
+    return Recording(name, run.key, frames, configuration.types, simulator.site, poses_key(configuration))
 
 
 def simulated(recordings: Sequence[SampledRecording]) -> Generator[Progress, None, None]:

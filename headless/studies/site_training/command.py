@@ -24,10 +24,9 @@ from headless.detection.recordings import MountedSensors, SampledRun, Simulator,
 from headless.detection.settings import NetworkSettings, TrainingSettings
 from headless.detection.training import train
 from headless.options import add_settings, new_parser, read_settings, real_number
-from headless.studies.detection.case_study import simulated
+from headless.studies.detection.case_study import recorded, simulated
 from headless.studies.random_sites.companions import with_companions
 from headless.studies.random_sites.varied_bodies import resized
-from headless.studies.simulated_recordings import recorded
 
 import bpy
 import numpy as np
