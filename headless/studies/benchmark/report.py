@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,6 +13,7 @@ from headless.studies.benchmark.placement import SolverRun
 from headless.studies.benchmark.resource_usage import Expense
 from headless.studies.benchmark.scans import ROAD_USERS, SENSORS
 from headless.studies.benchmark.visibility import Cost
+from headless.studies.markdown import table
 
 from seip_addon.core.storage.files import whole_file
 
@@ -104,7 +105,7 @@ def _summary(findings: Findings) -> list[str]:
         (one.quantity, one.required, one.measured, "met" if one.met else "**not met**")
         for one in requirements(findings)
     ]
-    return ["# Benchmark", text, _table(("", "required", "measured", ""), rows)]
+    return ["# Benchmark", text, table(("", "required", "measured", ""), rows)]
 
 
 def _about_visibility(findings: Findings) -> list[str]:
@@ -128,7 +129,7 @@ def _about_visibility(findings: Findings) -> list[str]:
         for method, cost in findings.visibility.items()
     ]
     head = ("method", "times as fast as the plain loop", "s", "wall-clock s", "rays", "rays per visible target")
-    return ["## Visibility", text, _table(head, rows)]
+    return ["## Visibility", text, table(head, rows)]
 
 
 def _about_placement(findings: Findings) -> list[str]:
@@ -156,7 +157,7 @@ def _about_placement(findings: Findings) -> list[str]:
         for run in findings.runs
     ]
     head = ("instance", "method", "ours is … times as fast", "s", "wall-clock s", "MB", "covers", "gap", "own gap")
-    return ["## Placement", text, _table(head, rows)]
+    return ["## Placement", text, table(head, rows)]
 
 
 def _about_growth(findings: Findings) -> list[str]:
@@ -178,7 +179,7 @@ def _about_growth(findings: Findings) -> list[str]:
         for growth in findings.growths
     ]
     head = ("work", "growing size", "sizes", "s", "exponent", "MB", "exponent of memory")
-    return ["## Growth", text, _table(head, rows)]
+    return ["## Growth", text, table(head, rows)]
 
 
 def _about_scans(findings: Findings) -> list[str]:
@@ -195,7 +196,7 @@ def _about_scans(findings: Findings) -> list[str]:
         (engine, f"{setting['frames'] / cost.cpu:.3g}", f"{setting['frames'] / cost.wall:.3g}")
         for engine, cost in findings.scans.items()
     ]
-    return ["## Scans of traffic", text, _table(("ray caster", "frames per second", "per wall-clock second"), rows)]
+    return ["## Scans of traffic", text, table(("ray caster", "frames per second", "per wall-clock second"), rows)]
 
 
 def _ratio(quantity: str, ratio: float, required: float, *, holds: bool = True, note: str = "") -> Requirement:
@@ -212,10 +213,3 @@ def _small_gap(run: SolverRun, gap: float, seconds: float, memory: float | None)
         measured += f" and {run.memory / 1024:.1f} GB"
         met &= run.memory < memory
     return Requirement(f"ours, {run.instance}", required, measured, met)
-
-
-def _table(head: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
-    """Return a table in Markdown."""
-    head = list(head)
-    lines = [head, ["---"] * len(head), *rows]
-    return "\n".join("| " + " | ".join(cells) + " |" for cells in lines)

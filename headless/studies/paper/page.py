@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 from headless.studies.claims import Claim
 from headless.studies.coverage.cells import CHARTED_WEIGHT, COUNTS, CoverageStudy
+from headless.studies.markdown import table
 
 from seip_addon.core.estimates import Interval
 
@@ -74,7 +75,7 @@ def page(
         *_figures(study, placements),
         f"![Coverage by type, height and number]({chart})",
         "## What differs",
-        _table(
+        table(
             ("", "the paper", "here"),
             [(aspect, theirs, ours.format(**facts)) for aspect, theirs, ours in DIFFERENCES],
         ),
@@ -88,7 +89,7 @@ def _claims(claims: Sequence[Claim]) -> str:
         (str(one.number), one.where, one.says, *measured.get(one.number, ("not measured", "–")))
         for one in PUBLISHED_CLAIMS
     ]
-    return _table(("#", "in the paper", "the paper", "here", "verdict"), rows)
+    return table(("#", "in the paper", "the paper", "here", "verdict"), rows)
 
 
 def _figures(study: CoverageStudy, placements: Sequence[PlacementFigures]) -> Iterator[str]:
@@ -99,16 +100,16 @@ def _figures(study: CoverageStudy, placements: Sequence[PlacementFigures]) -> It
         for sensor in study.sensors
         for height in (*study.heights, None)
     ]
-    yield _table(("type", "height", *numbers), rows)
+    yield table(("type", "height", *numbers), rows)
     weighted = list(_weighted(study))
     if weighted:
         yield f"Four sensors, vanilla and with weight {CHARTED_WEIGHT:g} in the centre (section V-B):"
-        yield _table(("type", "centre, vanilla", "centre, weighted", "whole, vanilla", "whole, weighted"), weighted)
+        yield table(("type", "centre, vanilla", "centre, weighted", "whole, vanilla", "whole, weighted"), weighted)
     yield (
         "Average precision at an overlap of 0.7 from above (section V-C), the mean over the trainings; in brackets the "
         "first training's 95 % interval over test runs. *False*: false positives per frame (section V-D)."
     )
-    yield _table(("placement", "coverage", "AP", "the paper's gain", "ours", "false"), list(_precisions(placements)))
+    yield table(("placement", "coverage", "AP", "the paper's gain", "ours", "false"), list(_precisions(placements)))
 
 
 def _cover(study: CoverageStudy, sensor: str, count: int, height: float | None) -> str:
@@ -141,8 +142,3 @@ def _precisions(placements: Sequence[PlacementFigures]) -> Iterator[tuple[str, .
         between = "" if one.interval is None else f" ({one.interval[0]:.1%} to {one.interval[1]:.1%})"
         precision = f"{one.precision:.1%}{between}"
         yield one.name, f"{one.coverage:.1%}", precision, theirs, ours, f"{one.false_positives:.2f}"
-
-
-def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    lines = [head, ("---",) * len(head), *rows]
-    return "\n".join(f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in line)} |" for line in lines)

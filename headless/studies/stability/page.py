@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from dataclasses import astuple, dataclass
 from pathlib import Path
 
+from headless.studies.markdown import table
+
 from seip_addon.core.storage.files import whole_file
 
 HEADINGS = ("Method", "Driven by", "Begins to fail", "How found", "What the tool does")
@@ -64,12 +66,7 @@ def save_page(path: Path, lead: str, chapters: Sequence[Chapter], charts: str) -
     """
     parts = ["# Stability", lead]
     for chapter in chapters:
-        parts += [f"## {chapter.title}", _table(chapter.rows)]
+        parts += [f"## {chapter.title}", table(HEADINGS, list(map(astuple, chapter.rows)))]
         parts += [f"![{caption}]({charts}/{file})\n\n{caption}" for file, caption in chapter.charts.items()]
     with whole_file(path) as temporary:
         temporary.write_text("\n\n".join(parts) + "\n", encoding="utf-8")
-
-
-def _table(rows: Sequence[Row]) -> str:
-    lines = [HEADINGS, ("---",) * len(HEADINGS), *map(astuple, rows)]
-    return "\n".join(f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in line)} |" for line in lines)
