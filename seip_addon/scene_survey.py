@@ -23,10 +23,12 @@ from .core.progress import Progress
 from .core.workflows.records import inputs_of, restored_solution
 from .core.workflows.survey import Survey, lay_out, see
 from .core.workflows.survey_settings import SurveySettings
-from .scene.changes import Watch, on_update, watch
+from .scene import changes
+from .scene.changes import Watch, watch
 from .scene.read import SceneReading, read_scene
 from .scene_status import FILE_VERSION, obstacle, same_grid
 from .session import Resources, SceneState, session
+from .viewport import overlays
 
 LOAD_DELAY = 0.2
 """Seconds from the opening of a file to the work on it."""
@@ -157,7 +159,27 @@ def _before_save(*_: object) -> None:
             scene.seip.version = FILE_VERSION
 
 
-HANDLERS = (("load_post", _after_load), ("save_pre", _before_save), ("depsgraph_update_post", on_update))
+@bpy.app.handlers.persistent  # type: ignore[untyped-decorator]
+def _after_undo(*_: object) -> None:
+    """Look soon whether scenes are as they were when they were read: Blender is not ready for work yet."""
+    if not bpy.app.timers.is_registered(look_again):
+        bpy.app.timers.register(look_again, first_interval=0.0)
+
+
+def look_again() -> None:
+    """Look whether scenes are as they were when they were read, and draw that in the panel."""
+    for scene in bpy.data.scenes:
+        changes.look_again(scene)
+    overlays.redraw()
+
+
+HANDLERS = (
+    ("load_post", _after_load),
+    ("save_pre", _before_save),
+    ("depsgraph_update_post", changes.on_update),
+    ("undo_post", _after_undo),
+    ("redo_post", _after_undo),
+)
 
 
 def attach() -> None:
@@ -171,5 +193,6 @@ def detach() -> None:
     """Watch no longer."""
     for event, handler in HANDLERS:
         getattr(bpy.app.handlers, event).remove(handler)
-    if bpy.app.timers.is_registered(_compare):
-        bpy.app.timers.unregister(_compare)
+    for timer in (_compare, look_again):
+        if bpy.app.timers.is_registered(timer):
+            bpy.app.timers.unregister(timer)

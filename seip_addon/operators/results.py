@@ -269,7 +269,6 @@ class SEIP_OT_evaluate_sensors(ForPlacement, LongWork[SceneState], bpy.types.Ope
     def conclude(self, scene: bpy.types.Scene, result: SceneState) -> None:
         """Make the sensors at their present poses the placement."""
         survey, solution = result.placed()
-        live_coverage.stop()
         take_over(scene, survey.site, solution.deployment, labelled_sensors(scene, hidden=True))
         provenance = Provenance(datetime.now(UTC), result.durations, versions(blender=bpy.app.version_string))
         record = record_of(survey, solution, provenance)
@@ -291,6 +290,7 @@ def _evaluated(
 def keep_result(scene: bpy.types.Scene, state: SceneState, record: PlacementRecord) -> None:
     """Have the scene keep a placement that stands in it, all that is needed to go on later included."""
     survey, solution = state.placed()
+    live_coverage.stop()
     kept = scene.seip.result
     kept.change = "" if no_placement(scene) else change_text(record, parsed_record(kept.record))
     kept.record = record.text()
@@ -299,7 +299,7 @@ def keep_result(scene: bpy.types.Scene, state: SceneState, record: PlacementReco
     kept.sensors.clear()
     for sensor in solution.deployment.sensors:
         kept.sensors.add().name = sensor.label
-    scene.seip.sections.follow_steps()
+    bpy.context.window_manager.seip_sections.follow_steps()
     session.keep_state(scene, replace(state, record=kept.record))
 
 

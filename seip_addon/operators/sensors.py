@@ -65,7 +65,7 @@ class SEIP_OT_about_sensor(bpy.types.Operator):
         """Open the section with the figures."""
         seip = context.scene.seip
         seip.survey.about = self.key
-        seip.sections.about_sensor = True
+        context.window_manager.seip_sections.about_sensor = True
         return {"FINISHED"}
 
 

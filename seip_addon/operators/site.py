@@ -428,7 +428,7 @@ class SEIP_OT_check_site(LongWork[SiteCheck], bpy.types.Operator):
         for problem in result.problems:
             listed = site.problems.add()
             listed.name, listed.text, listed.is_error = problem.obj, problem.text, problem.severity == "ERROR"
-        scene.seip.sections.follow_steps()
+        bpy.context.window_manager.seip_sections.follow_steps()
         self.report({"INFO"}, in_short(site.problems))
 
 

@@ -14,6 +14,7 @@ from ..core.workflows.traffic_runs import traffic_folder
 from ..operators.detection import NO_PYTHON, SEIP_OT_detect, sensors_key, why_no_detection
 from ..properties.conversion import absolute
 from .run_button import draw_run
+from .sections import Status
 from .sidebar import settings_column
 from .wrapped_text import BOX, draw_sentence
 
@@ -31,6 +32,18 @@ MEANING = (
     "two-wheelers and pedestrians). In brackets the 95% interval over other traffic."
 )
 CHANGED = "The sensors have changed since: detect again."
+
+
+def status(scene: bpy.types.Scene) -> Status:
+    """Return the average precision for the header, and whether the sensors have changed since."""
+    detection = scene.seip.detection
+    try:
+        found = parsed_detection(detection.record) if detection.record else None
+    except SeipError:
+        found = None
+    if found is None:
+        return Status()
+    return Status(sensors_key(scene) != detection.sensors, (f"AP {figures(found)[1][1].partition(' ')[0]}",))
 
 
 def draw(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
@@ -61,7 +74,7 @@ def _draw_found(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
         draw_sentence(box, str(error), icon="ERROR", reserved=BOX)
         return
     column = box.column()
-    if sensors_key(scene) != detection.sensors:
+    if status(scene).changed:
         draw_sentence(column, CHANGED, icon="ERROR", reserved=BOX)
         column = box.column()
         column.active = False

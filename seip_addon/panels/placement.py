@@ -22,7 +22,7 @@ from ..operators.sensors import SEIP_MT_survey_presets, SEIP_OT_add_survey_prese
 from ..operators.visibility import SEIP_OT_compare_scene
 from ..sensor_edits import sensor_edits
 from .run_button import draw_run
-from .sections import draw_sections
+from .sections import BETWEEN, Status, draw_sections
 from .sidebar import RowList, is_narrow, settings_column
 from .wrapped_text import BOX, draw_sentence
 
@@ -52,16 +52,21 @@ class SEIP_UL_rules(RowList, bpy.types.UIList):
         row.prop(item, "rule", text="")
 
 
-def status(scene: bpy.types.Scene) -> str:
-    """Return quality, price and certificate of the placement, in the words of the header."""
+def status(scene: bpy.types.Scene) -> Status:
+    """Return quality, price and certificate of the placement for the header, and whether it is out of date."""
     if no_placement(scene):
-        return "none yet"
-    text = status_text(parsed_record(scene.seip.result.record))
-    return f"{text} · changed" if _doubts(scene) or scene_status.other_goal(scene) else text
+        return Status(result=("none yet",))
+    parts = status_text(parsed_record(scene.seip.result.record)).split(BETWEEN)
+    return Status(is_changed(scene) or bool(scene_status.other_goal(scene)), tuple(parts))
+
+
+def is_changed(scene: bpy.types.Scene) -> bool:
+    """Return whether the placement is known not to be of the scene as it is now."""
+    return any(text != scene_status.NOT_COMPARED for text in _doubts(scene))
 
 
 def _doubts(scene: bpy.types.Scene) -> list[str]:
-    """Return why the placement is not of the scene as it is now."""
+    """Return why the placement is not, or may not be, of the scene as it is now."""
     return [text for text in (scene_status.stale_placement(scene), sensor_edits(scene).describe()) if text]
 
 

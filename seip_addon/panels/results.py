@@ -12,9 +12,9 @@ from ..core.output.results.placement_record import PlacementRecord
 from ..core.sensing.lidar.model import short_name
 from ..operators import results
 from ..session import FollowedSensors, session
-from . import view
+from . import placement, view
 from .run_button import draw_run
-from .sections import draw_sections
+from .sections import Status, draw_sections
 from .sidebar import RowList
 from .wrapped_text import draw_sentence
 
@@ -50,6 +50,11 @@ class SEIP_UL_kept(RowList, bpy.types.UIList):
     def draw_row(self, layout: bpy.types.UILayout, item: bpy.types.PropertyGroup) -> None:
         """Draw a name that can be changed."""
         layout.prop(item, "name", text="", emboss=False)
+
+
+def status(scene: bpy.types.Scene) -> Status:
+    """Return whether the placement is out of date."""
+    return Status(not results.no_placement(scene) and placement.is_changed(scene))
 
 
 def draw(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:

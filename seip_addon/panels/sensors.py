@@ -17,24 +17,26 @@ from ..operators.sensors import SEIP_OT_about_sensor, SEIP_OT_drop_sensor_type, 
 from ..scene.materials import REFLECTIVITY
 from ..session import session
 from ..viewport import beam_preview
-from .sections import draw_sections
+from .sections import Status, draw_sections
 from .sensor_table import SEIP_OT_choose_sensors, pedestrian_range
 from .sidebar import is_narrow, settings_column
 from .wrapped_text import draw_sentence
 
 
-def status(scene: bpy.types.Scene) -> str:
-    """Return the placed sensors, or the types to choose from and their heights, in the words of the header."""
+def status(scene: bpy.types.Scene) -> Status:
+    """Return the placed sensors for the header, or the types to choose from and their heights."""
     survey = scene.seip.survey
+    used, heights = survey.used_types(), survey.parsed_heights()
     if not no_placement(scene):
-        placed = parsed_record(scene.seip.result.record).sensors
-        heights = sorted({sensor.height_m for sensor in placed})
-        names = {sensor.sensor for sensor in placed}
-        return f"{len(placed)} × {_names(sorted(names))} at {_span(heights)}"
-    used = survey.used_types()
+        record = parsed_record(scene.seip.result.record)
+        names = sorted({sensor.sensor for sensor in record.sensors})
+        placed_heights = sorted({sensor.height_m for sensor in record.sensors})
+        candidates = record.request.candidates
+        changed = (tuple(used), tuple(heights)) != (candidates.sensors, candidates.heights)
+        return Status(changed, (f"{len(record.sensors)} × {_names(names)}", f"at {_span(placed_heights)}"))
     if not used:
-        return "none chosen"
-    return f"{_names(used)} at {'?' if survey.wrong_heights() else _span(survey.parsed_heights())}"
+        return Status(result=("none chosen",))
+    return Status(result=(_names(used), f"at {_span(heights)}" if heights else "no valid height"))
 
 
 def _names(keys: list[str]) -> str:

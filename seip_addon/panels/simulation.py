@@ -10,11 +10,18 @@ from .. import preferences
 from ..operators.simulation import SEIP_OT_simulate_traffic, why_no_simulation
 from . import sumo
 from .run_button import draw_run
+from .sections import Status
 from .sidebar import settings_column
 from .wrapped_text import draw_sentence
 
 USED = "Detection and placements in traffic use these runs."
 CHANGED = "The settings have changed since: simulate again."
+
+
+def status(scene: bpy.types.Scene) -> Status:
+    """Return whether the settings have changed since the last simulation."""
+    simulation = scene.seip.simulation
+    return Status(bool(simulation.facts) and simulation.made_with != simulation.key())
 
 
 def draw(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
@@ -34,5 +41,5 @@ def draw(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     if not simulation.facts:
         return
     draw_sentence(layout, f"{simulation.facts}. {USED}")
-    if simulation.made_with != simulation.key():
+    if status(scene).changed:
         draw_sentence(layout, CHANGED, icon="ERROR")

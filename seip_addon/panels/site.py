@@ -25,7 +25,7 @@ from ..properties.site import SEIP_PG_site
 from ..scene import roles
 from . import sumo
 from .run_button import draw_run
-from .sections import draw_sections
+from .sections import Status, draw_sections
 from .sidebar import is_narrow, settings_column
 from .wrapped_text import draw_sentence
 
@@ -35,12 +35,16 @@ SHOW_WIDTH = 28.0
 """Width of the button next to a problem, pixels at the usual scale of the interface."""
 
 
-def status(scene: bpy.types.Scene) -> str:
-    """Return the name of the site and its number of targets, in the words of the header."""
+def status(scene: bpy.types.Scene) -> Status:
+    """Return the problems that the check found, the number of targets and the name of the site for the header."""
     if scene_status.has_nothing(scene):
-        return "none yet"
-    targets = next((one.value.partition(", ")[0] for one in scene.seip.site.counts if one.name == TARGETS), "")
-    return f"{scene.name} · {targets} points" if targets else scene.name
+        return Status(result=("none yet",))
+    site = scene.seip.site
+    if not site.checked:
+        return Status(result=("not checked", scene.name))
+    targets = (f"{one.value.partition(', ')[0]} points" for one in site.counts if one.name == TARGETS)
+    doubt = scene_status.stale_check(scene)
+    return Status(doubt not in {"", scene_status.OLD_CHECK}, (in_short(site.problems), *targets, scene.name))
 
 
 def draw(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:

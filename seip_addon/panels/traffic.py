@@ -15,9 +15,19 @@ from ..operators.traffic import (
 from ..session import session
 from . import detection, simulation, verification
 from .run_button import draw_run
-from .sections import draw_sections
+from .sections import Status, draw_sections
 from .sidebar import settings_column
 from .wrapped_text import draw_sentence
+
+
+def _each_status(scene: bpy.types.Scene) -> dict[str, Status]:
+    """Return the status of each section that has one."""
+    return {"simulation": simulation.status(scene), "detection": detection.status(scene)}
+
+
+def status(scene: bpy.types.Scene) -> Status:
+    """Return whether some result below is out of date."""
+    return Status(any(one.changed for one in _each_status(scene).values()))
 
 
 def draw(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
@@ -48,6 +58,7 @@ def draw(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
             "verification": verification.draw,
         },
         context,
+        _each_status(context.scene),
     )
 
 

@@ -9,7 +9,6 @@ from ..scene_status import FILE_VERSION
 from .detection import SEIP_PG_detection
 from .placement import SEIP_PG_goal
 from .results import SEIP_PG_placement, SEIP_PG_result
-from .sections import SEIP_PG_sections
 from .simulation import SEIP_PG_simulation
 from .site import SEIP_PG_site
 from .survey import SEIP_PG_survey
@@ -22,7 +21,6 @@ class SEIP_PG_scene(bpy.types.PropertyGroup):
     """All that SEIP keeps with a scene."""
 
     version: IntProperty(name="Version", default=FILE_VERSION, options={"HIDDEN"})
-    sections: PointerProperty(type=SEIP_PG_sections)
     site: PointerProperty(type=SEIP_PG_site)
     survey: PointerProperty(type=SEIP_PG_survey)
     goal: PointerProperty(type=SEIP_PG_goal)

@@ -108,12 +108,12 @@ def test_a_sensor_is_dropped_and_shown(survey):
     with pytest.raises(RuntimeError, match="no sensor type 'none'"):
         bpy.ops.seip.drop_sensor_type(key="none")
     assert bpy.ops.seip.about_sensor(key="vlp16") == {"FINISHED"}
-    assert bpy.context.scene.seip.sections.about_sensor
+    assert bpy.context.window_manager.seip_sections.about_sensor
     layout = DrawnLayout()
-    bpy.context.scene.seip.sections.sensors = True
+    bpy.context.window_manager.seip_sections.sensors = True
     sensors.draw(layout, bpy.context)
     assert "Velodyne VLP-16 (Puck)" in layout.text
-    assert sensors.status(bpy.context.scene) == "VLP-16 (Puck) at 3.5–8 m"
+    assert sensors.status(bpy.context.scene).result == ("VLP-16 (Puck)", "at 3.5–8 m")
 
 
 def test_the_cache_is_emptied_of_grids_alone(survey):

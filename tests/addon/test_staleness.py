@@ -5,7 +5,7 @@ from pathlib import Path
 import bpy
 import pytest
 
-from seip_addon import scene_status
+from seip_addon import live_coverage, scene_status, scene_survey
 from seip_addon.session import SceneState, session
 
 
@@ -82,6 +82,44 @@ def test_a_change_that_is_undone_is_noticed(known):
     reshaped = session.state_of(bpy.context.scene)
     bpy.ops.ed.undo()
     assert read_again(reshaped)
+
+
+@pytest.mark.parametrize("change", [move, reshape, modify, hide])
+def test_undo_of_a_change_leaves_no_trace(known, change):
+    sections = bpy.context.window_manager.seip_sections
+    bpy.ops.seip.solve_placement()
+    bpy.ops.seip.follow_sensors()
+    assert bpy.ops.seip.check_site() == {"FINISHED"}
+    scene = bpy.context.scene
+    states = scene_status.stale_placement, scene_status.stale_check
+    bpy.ops.ed.undo_push(message="before")
+    change()
+    bpy.context.view_layer.update()
+    bpy.ops.ed.undo_push(message="after")
+    assert all(state(scene) for state in states)
+    live_coverage.update()
+    assert session.following.problem
+    sections.details = True
+    sections.site = False
+    bpy.ops.ed.undo()
+    for again in (scene_survey.look_again, live_coverage.update):
+        assert bpy.app.timers.is_registered(again)
+        again()
+    assert [state(bpy.context.scene) for state in states] == ["", ""]
+    assert session.following.problem == ""
+    assert (sections.details, sections.site) == (True, False)
+
+
+def test_following_ends_without_an_error_where_undo_brings_back_another_placement(known):
+    bpy.ops.seip.solve_placement()
+    bpy.ops.ed.undo_push(message="two sensors")
+    bpy.context.scene.seip.goal.count = 1
+    bpy.ops.seip.solve_placement()
+    bpy.ops.ed.undo_push(message="one sensor")
+    bpy.ops.seip.follow_sensors()
+    bpy.ops.ed.undo()
+    live_coverage.update()
+    assert session.following is None
 
 
 def select() -> None:

@@ -96,11 +96,11 @@ def _check(window: Window) -> Steps:
     yield from window.open_section("site")
     yield from window.open_section("contents")
     yield from window.picture("2-check")
-    _scene().seip.sections.site = False
+    bpy.context.window_manager.seip_sections.site = False
 
 
 def _choose(window: Window) -> Steps:
-    sections = _scene().seip.sections
+    sections = bpy.context.window_manager.seip_sections
     yield from window.open_section("sensors")
     yield from window.enter("seip.survey.heights", "8")
     yield from window.click("seip.choose_sensors(")
@@ -204,7 +204,7 @@ def _move_by_hand(window: Window) -> Steps:
 def _report(window: Window) -> Steps:
     """Export with a report, and see that all files tell of one placement."""
     _scene().seip.result.folder = str(FOLDER)
-    _scene().seip.sections.placement = False
+    bpy.context.window_manager.seip_sections.placement = False
     yield from window.open_section("export")
     yield from window.click("seip.write_report(")
     yield from window.until(lambda: session.running is None and (FOLDER / "report.pdf").exists(), 200)
@@ -217,7 +217,7 @@ def _report(window: Window) -> Steps:
     yield from window.picture("8-report")
     yield from window.click("seip.save_picture(")
     yield from window.until((OUT / "placement.png").exists, 60)
-    _scene().seip.sections.export = False
+    bpy.context.window_manager.seip_sections.export = False
 
 
 def _scan(window: Window) -> Steps:
@@ -236,7 +236,7 @@ def _scan(window: Window) -> Steps:
 def _simulate(window: Window) -> Steps:
     """Simulate traffic, stop that, simulate again, undo it and redo it; where SUMO is missing its button is there."""
     preferences.own().sumo = str(SUMO.resolve()) if SUMO is not None else ""
-    _scene().seip.sections.scan = False
+    bpy.context.window_manager.seip_sections.scan = False
     yield from window.open_section("simulation")
     if preferences.sumo() is None:
         yield from window.find("seip.install_sumo(")
@@ -309,7 +309,7 @@ def _reopen(window: Window) -> Steps:
     yield from window.open_sidebar("SEIP")
     yield from window.press("NUMPAD_0")  # the camera's view
     yield from window.until(lambda: session.running is None and _known() is not None, 30)
-    _scene().seip.sections.details = True
+    bpy.context.window_manager.seip_sections.details = True
     yield from window.open_section("placement")
 
 
