@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from ...choosing.placement.objective import MOVED, purpose
+from ...choosing.placement.objective import ACCEPTED_MESSAGE, MOVED, purpose
 from ...choosing.placement.returns_summary import FEW_RETURNS, returns_text, share_reached
 from ...counts import counted
 from .costs import costs_of
@@ -49,7 +49,8 @@ def recommendation(record: PlacementRecord) -> str:
     """Return the most useful next step to a better or cheaper placement, or "" if none stands out."""
     more = possible_improvement(record)
     if more is not None and more >= LARGE_GAP and record.judgement is None:
-        return "Search longer for a better placement: raise the effort."
+        how = "let the search run to its end" if ACCEPTED_MESSAGE in record.notes else "raise the effort"
+        return f"Search longer for a better placement: {how}."
     crossing = min(record.returns.crossings, key=lambda one: one.least, default=None) if record.returns else None
     if crossing is not None and crossing.least < FEW_RETURNS:
         return f"Few returns from pedestrians ({returns_text(crossing.least)}) at {crossing.name}: add a sensor there."
