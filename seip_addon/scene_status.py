@@ -13,6 +13,7 @@ from .core.errors import SeipError
 from .core.output.results.placement_file import parsed_record
 from .core.workflows.survey_settings import SurveySettings
 from .scene import contract
+from .scene.sensors import labelled_sensors
 from .session import session
 
 FILE_VERSION = 1
@@ -23,6 +24,7 @@ LINKED = "This scene is linked from another file: open that file to work on it."
 NOT_COMPARED = "Not compared with the scene since the file was opened."
 ANOTHER_SITE = "The scene or its settings have changed since this placement: place again."
 NO_SITE = "There is no site yet."
+UNEVALUATED = "There are sensors without figures in the scene: evaluate them."
 OLD_CHECK = "Checked before the file was opened: check again."
 
 
@@ -53,6 +55,11 @@ def has_nothing(scene: bpy.types.Scene) -> bool:
     return not any(contract.has_members(scene, name) for name in (contract.REGION, contract.ROADS))
 
 
+def has_unevaluated(scene: bpy.types.Scene) -> bool:
+    """Return whether there are sensors without a placement, as in a file that a command wrote."""
+    return not scene.seip.result.record and bool(labelled_sensors(scene, hidden=True))
+
+
 def next_step(scene: bpy.types.Scene) -> str:
     """Return the operator, by its ``bl_idname``, that comes next on the way to placed sensors; empty at its end."""
     site = scene.seip.site
@@ -60,6 +67,8 @@ def next_step(scene: bpy.types.Scene) -> str:
         return ""
     if scene.seip.result.record:
         return "seip.solve_placement" if other_goal(scene) else ""
+    if has_unevaluated(scene) and not obstacle(scene):
+        return "seip.evaluate_sensors"
     if obstacle(scene):
         if site.has_place():
             return "seip.build_site"
@@ -74,7 +83,7 @@ def current_step(scene: bpy.types.Scene) -> str:
     operator = next_step(scene)
     if operator == "seip.choose_sensors":
         return "sensors"
-    return "placement" if operator in {"", "seip.solve_placement"} and not has_nothing(scene) else "site"
+    return "placement" if operator in {"", "seip.solve_placement", "seip.evaluate_sensors"} and not has_nothing(scene) else "site"
 
 
 def search_seconds(scene: bpy.types.Scene) -> float | None:

@@ -70,6 +70,14 @@ def with_visibility(state: SceneState) -> Generator[Progress, None, tuple[SceneS
     return replace(state, layout=survey, durations=state.timed("visibility", began)), survey
 
 
+def with_visibility_of(
+    surveying: Generator[Progress, None, SceneState],
+) -> Generator[Progress, None, tuple[SceneState, Survey]]:
+    """Do the work of `survey`, and that of `with_visibility` on its result."""
+    state = yield from surveying
+    return (yield from with_visibility(state))
+
+
 def with_placement(scene: bpy.types.Scene) -> Generator[Progress, None, SceneState]:
     """Return a job that restores a scene's placement from the record in the file and the cached grid.
 

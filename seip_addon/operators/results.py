@@ -70,7 +70,8 @@ def no_placement(scene: bpy.types.Scene) -> str:
     if scene_status.is_newer(scene):
         return scene_status.NEWER
     if not scene.seip.result.record:
-        return "There is no placement yet: place sensors first."
+        missing = "There is no placement yet: place sensors first."
+        return scene_status.UNEVALUATED if scene_status.has_unevaluated(scene) else missing
     try:
         parsed_record(scene.seip.result.record)
     except SeipError as error:
@@ -250,21 +251,27 @@ def _set_up(finding: Generator[Progress, None, SceneState]) -> Generator[Progres
     return state, visibility, SensorReturns(state.layout, solution.objective) if of_returns else None
 
 
-class SEIP_OT_evaluate_sensors(ForPlacement, LongWork[SceneState], bpy.types.Operator):
+class SEIP_OT_evaluate_sensors(ForReadyScene, LongWork[SceneState], bpy.types.Operator):
     """Evaluate the sensors of the scene at their present poses, and make them the placement"""
 
     bl_idname = "seip.evaluate_sensors"
-    bl_label = "Evaluate Moved Sensors"
+    bl_label = "Evaluate Sensors"
+
+    @classmethod
+    def why_not(cls, context: bpy.types.Context) -> str:
+        """Return a reason if an input is missing, or there is neither a placement nor a sensor."""
+        missing = no_placement(context.scene)
+        return super().why_not(context) or ("" if missing == scene_status.UNEVALUATED else missing)
 
     def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, SceneState]:
-        """Read the poses of the sensors."""
+        """Read the poses of the sensors; those without a placement are evaluated under the goal of the panel."""
         mounted = read_sensors(scene, preferences.catalogue(), hidden=True)
-        return _evaluated(
-            scene_survey.with_grid_of_placement(scene),
-            parsed_record(scene.seip.result.record).request.goal,
-            mounted,
-            position_names(scene),
-        )
+        text, names = scene.seip.result.record, position_names(scene)
+        if not text:
+            surveying = scene_survey.with_visibility_of(scene_survey.survey(scene))
+            return _evaluated(surveying, scene.seip.goal.objective(), mounted, names)
+        goal = parsed_record(text).request.goal
+        return _evaluated(scene_survey.with_grid_of_placement(scene), goal, mounted, names)
 
     def conclude(self, scene: bpy.types.Scene, result: SceneState) -> None:
         """Make the sensors at their present poses the placement."""

@@ -9,25 +9,27 @@ import bpy
 from .. import scene_survey
 from ..core.counts import counted
 from ..core.progress import Progress
+from ..core.workflows.survey import Survey
 from ..session import SceneState, session
 from .base import ForReadyScene, LongWork
 
 
-class SEIP_OT_compute_visibility(ForReadyScene, LongWork[SceneState], bpy.types.Operator):
+class SEIP_OT_compute_visibility(ForReadyScene, LongWork[tuple[SceneState, Survey]], bpy.types.Operator):
     """Compute which targets on the road are visible from each candidate pose"""
 
     bl_idname = "seip.compute_visibility"
     bl_label = "Compute Visibility"
     bl_options = {"REGISTER"}  # nothing in the file changes
 
-    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, SceneState]:
+    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, tuple[SceneState, Survey]]:
         """Read the scene where it has changed."""
-        return _seen(scene_survey.survey(scene))
+        return scene_survey.with_visibility_of(scene_survey.survey(scene))
 
-    def conclude(self, scene: bpy.types.Scene, result: SceneState) -> None:
+    def conclude(self, scene: bpy.types.Scene, result: tuple[SceneState, Survey]) -> None:
         """Hold the grid."""
-        session.keep_state(scene, result)
-        site = result.layout.site
+        state, survey = result
+        session.keep_state(scene, state)
+        site = survey.site
         targets, poses = counted(len(site.targets), "target"), counted(len(site.candidates), "pose")
         self.report({"INFO"}, f"visibility of {targets} from {poses} is known")
 
@@ -46,12 +48,6 @@ class SEIP_OT_compare_scene(ForReadyScene, LongWork[SceneState], bpy.types.Opera
     def conclude(self, scene: bpy.types.Scene, result: SceneState) -> None:
         """Hold what was read: the panel compares."""
         session.keep_state(scene, result)
-
-
-def _seen(surveying: Generator[Progress, None, SceneState]) -> Generator[Progress, None, SceneState]:
-    state = yield from surveying
-    state, _ = yield from scene_survey.with_visibility(state)
-    return state
 
 
 CLASSES = (SEIP_OT_compute_visibility, SEIP_OT_compare_scene)

@@ -20,6 +20,7 @@ from ..operators.placement import SEIP_OT_choose_number, SEIP_OT_judge_placement
 from ..operators.results import SEIP_OT_evaluate_sensors, no_placement
 from ..operators.sensors import SEIP_MT_survey_presets, SEIP_OT_add_survey_preset
 from ..operators.visibility import SEIP_OT_compare_scene
+from ..scene.sensors import labelled_sensors
 from ..sensor_edits import sensor_edits
 from .run_button import draw_run
 from .sections import BETWEEN, Status, draw_sections
@@ -54,6 +55,8 @@ class SEIP_UL_rules(RowList, bpy.types.UIList):
 
 def status(scene: bpy.types.Scene) -> Status:
     """Return quality, price and certificate of the placement for the header, and whether it is out of date."""
+    if scene_status.has_unevaluated(scene):
+        return Status(result=(counted(len(labelled_sensors(scene, hidden=True)), "sensor"), "not evaluated"))
     if no_placement(scene):
         return Status(result=("none yet",))
     parts = status_text(parsed_record(scene.seip.result.record)).split(BETWEEN)
@@ -91,6 +94,9 @@ def draw(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
         draw_sentence(layout, obstacle, icon="ERROR")
     if not no_placement(scene):
         _draw_answer(layout, scene)
+    elif scene_status.has_unevaluated(scene):
+        draw_sentence(layout, scene_status.UNEVALUATED, icon="INFO")
+        draw_run(layout, SEIP_OT_evaluate_sensors.bl_idname)
     draw_run(layout, SEIP_OT_judge_placement.bl_idname)
     draw_sections(
         layout,

@@ -11,6 +11,7 @@ from ..core.output.results.placement_file import parsed_record
 from ..core.output.results.placement_record import PlacementRecord
 from ..core.sensing.lidar.model import short_name
 from ..operators import results
+from ..scene.write import coverage_of
 from ..session import FollowedSensors, session
 from . import placement, view
 from .run_button import draw_run
@@ -63,6 +64,8 @@ def draw(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     sentence = results.no_placement(scene)
     if sentence:
         draw_sentence(layout, sentence, icon="INFO")
+        if coverage_of(scene) is not None:
+            draw_sections(layout, {"view": view.draw}, context)
         return
     result = scene.seip.result
     heading = layout.split(factor=SENSOR_SHARE)

@@ -89,6 +89,6 @@ def detach() -> None:
 
 
 def forget() -> None:
-    """Follow the steps again: another file is opened."""
+    """Close all sections but the current step: another file is opened, which may bring its own state."""
     if isinstance(bpy.data, bpy.types.BlendData):  # Blender shows nobody the open file while it registers an add-on
-        bpy.context.window_manager.seip_sections.follow_steps()
+        bpy.context.window_manager.property_unset("seip_sections")

@@ -107,7 +107,7 @@ def _quality(record: PlacementRecord, *, exact: bool = False) -> str:
 
 def _certificate(record: PlacementRecord) -> str:
     if record.objective.status == MOVED:
-        return "moved by hand"
+        return "not optimised"
     if record.objective.status == "optimal":
         return "proven"
     more = possible_improvement(record)
@@ -125,7 +125,7 @@ def _outlook(record: PlacementRecord) -> str:
     """Return how much better the best placement of these candidates could be."""
     objective = record.objective
     if objective.status == MOVED:
-        return "Sensors were moved by hand."
+        return "This is not an optimised placement: the sensors are evaluated where they stand."
     what = purpose(record.notes) if record.returns is None else ""  # else the sentence before has said it
     what += "" if record.judgement is None else " by the criterion"
     better = "cheaper" if objective.cheapest else "better"

@@ -76,7 +76,7 @@ def test_the_possible_improvement_is_that_of_the_bound(record):
     assert status_text(unknown).endswith("not proven")
     moved = within(record, 515.0, status=MOVED)
     assert possible_improvement(moved) is None
-    assert status_text(moved).endswith("moved by hand")
+    assert status_text(moved).endswith("not optimised")
 
 
 @pytest.mark.parametrize(("least", "word"), [(0.95, "good"), (0.9, "fair"), (0.5, "poor")])
