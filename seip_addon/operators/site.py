@@ -10,6 +10,7 @@ import bpy
 from .. import preferences, scene_status, sensor_types
 from ..core.counts import counted
 from ..core.errors import SeipError
+from ..core.output.results.answer import sentence
 from ..core.output.results.placement_record import relevant_warnings
 from ..core.progress import Progress, finish
 from ..core.site.check import SceneContents, SiteCheck, check_site
@@ -427,7 +428,8 @@ class SEIP_OT_check_site(LongWork[SiteCheck], bpy.types.Operator):
         site.problems.clear()
         for problem in result.problems:
             listed = site.problems.add()
-            listed.name, listed.text, listed.is_error = problem.obj, problem.text, problem.severity == "ERROR"
+            listed.name, listed.text = problem.obj, sentence(problem.text)
+            listed.is_error = problem.severity == "ERROR"
         bpy.context.window_manager.seip_sections.follow_steps()
         self.report({"INFO"}, in_short(site.problems))
 
