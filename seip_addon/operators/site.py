@@ -101,10 +101,10 @@ class SEIP_OT_choose_map(_WritesScene, LongWork[SitePlaces], bpy.types.Operator)
             self._ask(site, result)
 
     def _ask(self, site: SEIP_PG_site, found: SitePlaces) -> None:
-        """Ask for the place: on the map of an extract, in a dialog where there is no map or only one junction."""
-        if len(found.places) == 1:
+        """Ask for the place: on the map, or in a dialog where a description or the only junction gives it."""
+        if len(found.places) == 1 and not site.is_described():
             site.junction = found.places[0].name
-        elif bpy.ops.seip.pick_junction.poll():
+        elif not site.is_described() and bpy.ops.seip.pick_junction.poll():
             bpy.ops.seip.pick_junction("INVOKE_DEFAULT")
             return
         bpy.ops.seip.choose_place("INVOKE_DEFAULT")
