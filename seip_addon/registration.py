@@ -16,7 +16,7 @@ PARTS = (
     "operators.sensors", "operators.visibility", "operators.placement", "live_coverage",
     "operators.results", "operators.view", "operators.traffic", "operators.simulation", "operators.detection",
     "operators.verification",
-    "panels.sensor_table", "panels.placement", "panels.results", "panels.steps", "panels.front_door",
+    "panels.sensor_table", "panels.site", "panels.placement", "panels.results", "panels.steps", "panels.front_door",
 )  # fmt: skip
 """Modules of the add-on; most have ``CLASSES``.
 

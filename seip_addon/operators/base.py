@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Callable, Generator
 from typing import Generic, TypeVar
 
@@ -20,6 +21,8 @@ from ..session import RunningWork, scene_of, session
 Result = TypeVar("Result")
 Outcome = set[str]
 
+REPORT_WIDTH = 72
+"""Letters in a line of an error."""
 TIMER_INTERVAL = 0.1
 """Seconds between timer events while work is running."""
 SHOW_INTERVAL = 1.0
@@ -34,12 +37,17 @@ def attempt(operator: bpy.types.Operator, work: Callable[[], None]) -> Outcome:
     try:
         work()
     except SeipError as error:
-        operator.report({"ERROR"}, str(error))
+        _report(operator, str(error))
         return {"CANCELLED"}
     except ImportError as error:  # some packages are imported on first use
-        operator.report({"ERROR"}, f"a package of the extension is missing or broken ({error}): install its zip again")
+        _report(operator, f"a package of the extension is missing or broken ({error}): install its zip again")
         return {"CANCELLED"}
     return {"FINISHED"}
+
+
+def _report(operator: bpy.types.Operator, text: str) -> None:
+    """Report an error; Blender shows it in a window of its own, as wide as its longest line."""
+    operator.report({"ERROR"}, text if bpy.app.background else "\n".join(textwrap.wrap(text, REPORT_WIDTH)))
 
 
 def started(steps: Generator[Progress, None, Result]) -> Generator[Progress, None, Result]:

@@ -271,7 +271,13 @@ def missing_for_build(scene: bpy.types.Scene) -> str:
         return "Choose a map first"
     if site.is_extract() and preferences.sumo() is None:
         return preferences.NO_SUMO
-    return "" if site.has_place() else NO_PLACE
+    if not site.has_place():
+        return NO_PLACE
+    try:
+        site.request()
+    except SeipError as error:
+        return str(error)
+    return ""
 
 
 def is_of_choice(scene: bpy.types.Scene) -> bool:

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import bpy
 
-from ..core.errors import SeipError
-from ..operators.base import Outcome, SEIP_OT_stop, attempt
+from ..operators.base import SEIP_OT_stop
 from ..operators.detection import SEIP_OT_detect
 from ..operators.placement import SEIP_OT_solve_placement
 from ..operators.results import SEIP_OT_evaluate_sensors, SEIP_OT_export_result
@@ -19,47 +18,12 @@ from ..operators.site import (
     SEIP_OT_choose_map,
     SEIP_OT_download_map,
     SEIP_OT_load_example,
-    missing_for_build,
 )
 from ..operators.traffic import SEIP_OT_load_traffic, SEIP_OT_scan_frame, SEIP_OT_write_dataset
 from ..operators.view import SEIP_OT_colour_coverage, SEIP_OT_save_picture
 from ..operators.visibility import SEIP_OT_compute_visibility
-from .site import draw_place
 
 OPENDRIVE = "*.xodr"
-DIALOG_WIDTH = 420
-
-
-class SEIP_OT_choose_place(bpy.types.Operator):
-    """Choose the junction of the site, and the length of its streets"""
-
-    bl_idname = "seip.choose_place"
-    bl_label = "Import Site"
-    bl_options = {"INTERNAL"}
-
-    def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> Outcome:
-        """Ask."""
-        outcome: Outcome = context.window_manager.invoke_props_dialog(
-            self, width=DIALOG_WIDTH, confirm_text=SEIP_OT_build_site.bl_label
-        )
-        return outcome
-
-    def draw(self, context: bpy.types.Context) -> None:
-        """Draw the file, and the choice of the place."""
-        site = context.scene.seip.site
-        self.layout.label(text=bpy.path.basename(site.source), icon="FILE", translate=False)
-        draw_place(self.layout, site, DIALOG_WIDTH)
-
-    def execute(self, context: bpy.types.Context) -> Outcome:
-        """Build the site."""
-        return attempt(self, lambda: _build(context.scene))
-
-
-def _build(scene: bpy.types.Scene) -> None:
-    missing = missing_for_build(scene)
-    if missing:
-        raise SeipError(f"{missing}, in the sidebar's tab SEIP")
-    bpy.ops.seip.build_site("INVOKE_DEFAULT")
 
 
 class _Dropped:
@@ -135,7 +99,7 @@ def draw_object(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
 
 
 MENUS = (("TOPBAR_MT_file_import", draw_import), ("VIEW3D_MT_add", draw_add), ("VIEW3D_MT_object", draw_object))
-CLASSES = (SEIP_OT_choose_place, SEIP_FH_opendrive, SEIP_FH_openstreetmap, SEIP_MT_main)
+CLASSES = (SEIP_FH_opendrive, SEIP_FH_openstreetmap, SEIP_MT_main)
 
 
 def attach() -> None:

@@ -13,10 +13,18 @@ from ..session import session
 from .wrapped_text import draw_sentence
 
 
-def draw_run(layout: bpy.types.UILayout, operator: str, icon: str = "NONE", text: str | None = None) -> None:
+def draw_run(
+    layout: bpy.types.UILayout,
+    operator: str,
+    icon: str = "NONE",
+    text: str | None = None,
+    *,
+    in_one_row: bool = False,
+) -> None:
     """Draw an operator's button, or in its place the progress of its work; the button of the next step is emphasised.
 
-    The progress is a row that takes the place of the button, with the time in its bar, and a sentence below.
+    The progress is a row that takes the place of the button, with the time in its bar, and a sentence below unless
+    there is only one row.
     """
     running = session.running
     row = layout.row(align=True)
@@ -29,6 +37,8 @@ def draw_run(layout: bpy.types.UILayout, operator: str, icon: str = "NONE", text
     if running.acceptance is not None and running.acceptance.searching:
         row.operator("seip.accept", text="", icon="CHECKMARK")
     row.operator("seip.stop", text="", icon="X")
+    if in_one_row:
+        return
     line = progress_line(progress)
     draw_sentence(layout, f"{line[:1].upper()}{line[1:]}")
 

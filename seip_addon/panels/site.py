@@ -6,6 +6,7 @@ import bpy
 
 from .. import preferences, scene_status
 from ..core.site.roles import Role
+from ..operators.base import Outcome
 from ..operators.site import (
     SEIP_OT_add_area,
     SEIP_OT_assign_role,
@@ -31,6 +32,10 @@ from .wrapped_text import draw_sentence
 
 TARGETS = "Targets"
 """Count of the check that the header shows."""
+DIALOG_WIDTH = 420
+"""Width of the dialog of an import, pixels at the usual scale of the interface."""
+MESSAGE_LINES = 5
+"""Lines of that dialog for a message: as many as the longest takes."""
 SHOW_WIDTH = 28.0
 """Width of the button next to a problem, pixels at the usual scale of the interface."""
 
@@ -68,9 +73,13 @@ def _draw_map(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
     draw_run(layout, SEIP_OT_choose_map.bl_idname, icon="FILE_FOLDER", text=name or "Choose Map…")
     if not name:
         return
+    if len(site.junctions) > 1:
+        layout.operator(SEIP_OT_choose_map.bl_idname, icon="VIEWZOOM", text="Pick on Map…").filepath = site.source
     if site.is_extract():
-        draw_pick(layout, site)
-    draw_place(layout, site)
+        sumo.draw_missing(layout)
+    _draw_place(layout, site)
+    draw_sentence(layout, _place_text(site), icon="INFO")
+    draw_sections(layout, {"sources": _draw_all_sources}, site)
     if has_site(scene) and not missing_for_build(scene):
         again = "The site is built again; your own objects and the sensors stay."
         elsewhere = "The site is built in a new scene; this one stays."
@@ -90,22 +99,49 @@ def _draw_download(layout: bpy.types.UILayout, site: SEIP_PG_site) -> None:
         draw_run(layout, SEIP_OT_download_map.bl_idname, icon="WORLD")
 
 
-def draw_pick(layout: bpy.types.UILayout, site: SEIP_PG_site) -> None:
-    """Draw the button that shows the chosen extract as a map to pick a junction on."""
-    button = layout.operator(SEIP_OT_choose_map.bl_idname, icon="VIEWZOOM", text="Pick on Map…")
-    button.filepath = site.source
+class SEIP_OT_choose_place(bpy.types.Operator):
+    """Choose the junction of the site, and the length of its streets"""
+
+    bl_idname = "seip.choose_place"
+    bl_label = "Import Site"
+    bl_options = {"INTERNAL"}
+
+    def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> Outcome:
+        """Ask."""
+        outcome: Outcome = context.window_manager.invoke_props_dialog(
+            self, width=DIALOG_WIDTH, confirm_text=SEIP_OT_build_site.bl_label
+        )
+        return outcome
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Draw the file, the choice of the place, and what is missing: no choice adds or removes a row."""
+        site, layout = context.scene.seip.site, self.layout
+        layout.label(text=bpy.path.basename(site.source), icon="FILE", translate=False)
+        _draw_place(layout, site)
+        column = settings_column(layout)
+        _draw_sources(column, site)
+        column.row().prop(site, "terrain_epsg")
+        if site.is_extract() and preferences.sumo() is None:
+            sumo.draw_installation(layout, in_one_row=True)
+        elif site.is_extract():
+            layout.label(text="SUMO lays out the streets.", icon="CHECKMARK")
+        missing = missing_for_build(context.scene)
+        if missing == preferences.NO_SUMO and preferences.why_no_installation():
+            missing = f"{missing}. {preferences.why_no_installation()}"
+        text, icon = (f"{missing}.", "ERROR") if missing else (_place_text(site), "INFO")
+        draw_sentence(layout, text, icon=icon, width=DIALOG_WIDTH, least_lines=MESSAGE_LINES)
+
+    def execute(self, context: bpy.types.Context) -> Outcome:
+        """Build the site, or show the dialog again, with what is missing."""
+        if missing_for_build(context.scene) and not bpy.app.background:
+            bpy.ops.seip.choose_place("INVOKE_DEFAULT")
+            return {"CANCELLED"}
+        bpy.ops.seip.build_site("INVOKE_DEFAULT")
+        return {"FINISHED"}
 
 
-def draw_place(layout: bpy.types.UILayout, site: SEIP_PG_site, width: float | None = None) -> None:
-    """Draw the choice of a place in the chosen file and how large the site is; no choice adds or removes a row.
-
-    Parameters
-    ----------
-    width : float, optional
-        Width of a dialog, as for `draw_sentence`.
-    """
-    if site.is_extract():
-        sumo.draw_missing(layout, width)
+def _draw_place(layout: bpy.types.UILayout, site: SEIP_PG_site) -> None:
+    """Draw the choice of a place in the chosen file and how large the site is."""
     column = settings_column(layout)
     column.prop_search(site, "junction", site, "junctions", icon="DECORATE_DRIVER")
     if site.is_extract():
@@ -119,30 +155,35 @@ def draw_place(layout: bpy.types.UILayout, site: SEIP_PG_site, width: float | No
     shape.enabled = bool(site.junction) or site.is_extract()
     shape.prop(site, "region_shape")
     size.prop(site, "radius", text="Along Them" if site.follows_approaches() else "Radius")
-    draw_sentence(layout, _place_text(site), icon="INFO", width=width)
-    draw_sections(layout, {"sources": _draw_sources}, site)
 
 
-def _draw_sources(layout: bpy.types.UILayout, site: SEIP_PG_site) -> None:
-    """Draw further files of the site, each with the settings that say where it lies."""
-    column = settings_column(layout)
+def _draw_sources(column: bpy.types.UILayout, site: SEIP_PG_site) -> None:
+    """Draw further files of the site."""
     row = column.row()
     row.enabled = not site.is_extract()  # which has its own buildings, trees and posts
     row.prop(site, "osm")
     column.prop(site, "terrain")
+
+
+def _draw_all_sources(layout: bpy.types.UILayout, site: SEIP_PG_site) -> None:
+    column = settings_column(layout)
+    _draw_sources(column, site)
     if site.terrain:
         column.prop(site, "terrain_epsg")
 
 
 def _place_text(site: SEIP_PG_site) -> str:
-    """Return which place is chosen, in so few words that it is one line for every choice."""
+    """Return which place is chosen, or what is wrong with the choice."""
     if site.junction:
         return "The place: this junction."
     if site.is_described():
         return "The description's own place."
     if not site.is_extract():
         return "The middle of the map."
-    return "The place: this position." if site.position else "No place is chosen yet."
+    if not site.position:
+        return "No place is chosen yet."
+    wrong = site.wrong_position(site.position)
+    return f"{wrong}." if wrong else "The place: this position."
 
 
 def _draw_check(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
@@ -204,3 +245,6 @@ def _draw_object(layout: bpy.types.UILayout, scene: bpy.types.Scene, obj: bpy.ty
         column.prop(obj, "seip_region_weight")
     if Role.POLES in assigned:
         column.prop(obj, "seip_pole_rule")
+
+
+CLASSES = (SEIP_OT_choose_place,)

@@ -28,6 +28,7 @@ def draw_sentence(
     alert: bool = False,
     reserved: float = 0.0,
     width: float | None = None,
+    least_lines: int = 0,
 ) -> None:
     """Draw a sentence, wrapped to the width of the sidebar or of a dialog.
 
@@ -37,12 +38,15 @@ def draw_sentence(
         Width that a button in the same row takes.
     width : float, pixels at the usual scale of the interface, optional
         Width of the dialog that is drawn; by default that of the region.
+    least_lines : int
+        Number of lines that the sentence takes at least.
     """
     column = layout.column(align=True)
     column.alert = alert
     column.scale_y = 0.8
     rest = "NONE" if icon == "NONE" else "BLANK1"
-    for number, line in enumerate(wrapped(text, MARGIN + reserved + (ICON if icon != "NONE" else 0.0), width)):
+    lines = wrapped(text, MARGIN + reserved + (ICON if icon != "NONE" else 0.0), width)
+    for number, line in enumerate(lines + [""] * (least_lines - len(lines))):
         column.label(text=line, icon=icon if number == 0 else rest, translate=False)
 
 
