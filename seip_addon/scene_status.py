@@ -62,20 +62,23 @@ def has_unevaluated(scene: bpy.types.Scene) -> bool:
 
 def next_step(scene: bpy.types.Scene) -> str:
     """Return the operator, by its ``bl_idname``, that comes next on the way to placed sensors; empty at its end."""
-    site = scene.seip.site
     if not_own(scene) or is_newer(scene):
         return ""
     if scene.seip.result.record:
         return "seip.solve_placement" if other_goal(scene) else ""
-    if has_unevaluated(scene) and not obstacle(scene):
-        return "seip.evaluate_sensors"
     if obstacle(scene):
-        if site.has_place():
-            return "seip.build_site"
-        return "seip.download_map" if site.new_site and not site.source else "seip.choose_map"
-    if not site.checked:
+        return _next_for_site(scene.seip.site)
+    if has_unevaluated(scene):
+        return "seip.evaluate_sensors"
+    if not scene.seip.site.checked:
         return "seip.check_site"
     return "seip.solve_placement" if scene.seip.survey.used_types() else "seip.choose_sensors"
+
+
+def _next_for_site(site: bpy.types.PropertyGroup) -> str:
+    if site.has_place():
+        return "seip.build_site"
+    return "seip.download_map" if site.new_site and not site.source else "seip.choose_map"
 
 
 def current_step(scene: bpy.types.Scene) -> str:
@@ -83,7 +86,8 @@ def current_step(scene: bpy.types.Scene) -> str:
     operator = next_step(scene)
     if operator == "seip.choose_sensors":
         return "sensors"
-    return "placement" if operator in {"", "seip.solve_placement", "seip.evaluate_sensors"} and not has_nothing(scene) else "site"
+    is_last = operator in {"", "seip.solve_placement", "seip.evaluate_sensors"}
+    return "placement" if is_last and not has_nothing(scene) else "site"
 
 
 def search_seconds(scene: bpy.types.Scene) -> float | None:

@@ -23,7 +23,7 @@ from ..scene.sensors import labelled_sensors, pose_of
 from .base import Conditional, LongWork, started
 
 NO_SENSORS = "There is no sensor to detect road users with: place sensors first."
-NO_PYTHON = f"Detection needs a Python with PyTorch: {INSTALL}, and name its Python in the extension's preferences."
+NO_PYTHON = f"Detection needs a Python with PyTorch, named in the extension's preferences: {INSTALL}."
 
 
 def why_no_detection(scene: bpy.types.Scene) -> str:

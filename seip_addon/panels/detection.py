@@ -15,7 +15,7 @@ from ..operators.detection import NO_PYTHON, SEIP_OT_detect, sensors_key, why_no
 from ..properties.conversion import absolute
 from .run_button import draw_run
 from .sections import Status
-from .sidebar import settings_column
+from .sidebar import draw_path
 from .wrapped_text import BOX, draw_sentence
 
 NAMES = {
@@ -56,10 +56,9 @@ def draw(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
         if why_not == NO_PYTHON and preferences.own() is not None:
             layout.operator("preferences.addon_show", text="Preferences").module = preferences.ADDON_ID
     else:
-        column = settings_column(layout)
-        column.prop(detection, "runs", placeholder=traffic_folder(Path(bpy.data.filepath)).name)
-        column.prop(detection, "detector", placeholder="Shipped")
-        column.prop(detection, "folder")
+        draw_path(layout, detection, "runs", placeholder=traffic_folder(Path(bpy.data.filepath)).name)
+        draw_path(layout, detection, "detector", placeholder="Shipped")
+        draw_path(layout, detection, "folder")
         draw_run(layout, SEIP_OT_detect.bl_idname)
     if detection.record:
         _draw_found(layout, scene)

@@ -9,6 +9,7 @@ import bpy
 from ..operators import results
 from ..operators.view import SEIP_OT_save_picture, SEIP_OT_show_plan
 from .run_button import draw_run
+from .sidebar import draw_path
 from .wrapped_text import draw_sentence
 
 
@@ -19,7 +20,7 @@ def draw(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     if sentence:
         draw_sentence(layout, sentence, icon="INFO")
         return
-    layout.prop(scene.seip.result, "folder", text="")
+    draw_path(layout, scene.seip.result, "folder")
     layout.prop(scene.seip.result, "render")
     sentence = results.no_folder(scene) or results.not_evaluated(scene)
     if sentence:
@@ -28,8 +29,7 @@ def draw(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     draw_run(layout, results.SEIP_OT_export_result.bl_idname, icon="EXPORT", text="Export Files")
     _draw_files(layout, results.exported_files(scene))
     column = layout.column(align=True)
-    column.label(text="Picture")
-    column.prop(scene.seip.view, "picture", text="")
+    draw_path(column, scene.seip.view, "picture")
     draw_run(column, SEIP_OT_save_picture.bl_idname, icon="IMAGE_DATA")
 
 

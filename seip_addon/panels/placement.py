@@ -24,8 +24,8 @@ from ..scene.sensors import labelled_sensors
 from ..sensor_edits import sensor_edits
 from .run_button import draw_run
 from .sections import BETWEEN, Status, draw_sections
-from .sidebar import RowList, is_narrow, settings_column
-from .wrapped_text import BOX, draw_sentence
+from .sidebar import RowList, draw_path, is_narrow, settings_column
+from .wrapped_text import BOX, draw_sentence, sidebar_width
 
 _SHOWN = {
     "nominal": ("failures",),
@@ -129,7 +129,7 @@ def _draw_objective(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
     column.prop(goal, "criterion")
     column.prop(goal, "scenarios")
     if goal.scenarios == "traffic":
-        column.prop(goal, "runs", placeholder=traffic_folder(Path(bpy.data.filepath)).name)
+        draw_path(column, goal, "runs", placeholder=traffic_folder(Path(bpy.data.filepath)).name)
     for name in _SHOWN[goal.scenarios]:
         column.prop(goal, name)
     if goal.scenarios == "nominal" or goal.risk == "none":
@@ -166,20 +166,18 @@ def _draw_candidates(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None
     row.menu(SEIP_MT_survey_presets.__name__, text=SEIP_MT_survey_presets.bl_label)
     row.operator(SEIP_OT_add_survey_preset.bl_idname, text="", icon="ADD")
     row.operator(SEIP_OT_add_survey_preset.bl_idname, text="", icon="REMOVE").remove_active = True
-    column = settings_column(layout)
     for heading, names in (
-        ("", ("grid", "delta")),
+        ("Road", ("grid", "delta")),
         ("Positions", ("spacing", "allow")),
-        ("Weather", ("rain", "wet_road", "fog")),
+        ("Weather", ("rain", "wet_road", "fog", *(["visibility"] if survey.fog else []))),
+        ("Price", ("installed",)),
     ):
-        group = column.column(heading=heading)
+        layout.label(text=heading)
+        group = settings_column(layout)
         for name in names:
             group.prop(survey, name)
-    if survey.fog:
-        column.prop(survey, "visibility")
-    column.prop(survey, "installed")
     if survey.installed:
-        column.prop(survey, "installed_cost", placeholder="Shipped")
+        draw_path(layout, survey, "installed_cost", placeholder="Shipped")
 
 
 def _draw_search(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
@@ -273,7 +271,7 @@ def _draw_details(layout: bpy.types.UILayout, record: PlacementRecord, *, certai
         column = layout.column(align=True)
         for name, value in lines:
             row = column.split(factor=NAME_SHARE)
-            row.label(text=f"  {name}", translate=False)
+            draw_sentence(row, name, reserved=BOX + (1.0 - NAME_SHARE) * sidebar_width())
             row.label(text=value, translate=False)
     if certain:
         objective, notes = record.objective, record.notes
@@ -293,7 +291,7 @@ def figures(record: PlacementRecord) -> dict[str, list[tuple[str, str]]]:
     if objective.kind == "weighted":
         seen.append(("By weight", f"{coverage.weighted:.2%}"))
     if coverage.gain_band is not None and coverage.gain_band.sheets:
-        seen.append(("Plausible gains", f"{coverage.gain_band.low:.0%} to {coverage.gain_band.high:.0%}"))
+        seen.append(("With plausible gains", f"{coverage.gain_band.low:.0%} to {coverage.gain_band.high:.0%}"))
     returns: list[tuple[str, str]] = []
     crossings: list[tuple[str, str]] = []
     if record.returns is not None:
@@ -302,8 +300,8 @@ def figures(record: PlacementRecord) -> dict[str, list[tuple[str, str]]]:
     price = [(sensor.id, f"${sensor.price_usd:,.0f}") for sensor in record.sensors]
     return {
         "Seen": seen,
-        "Returns in Each Turn": returns,
-        "Returns at Worst Point": crossings,
+        "Returns in Each Revolution": returns,
+        "Pedestrian's Returns at Worst Point": crossings,
         "Price": [*price, ("Total", record.price_text)],
     }
 

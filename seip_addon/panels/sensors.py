@@ -91,13 +91,6 @@ def _draw_mounting(layout: bpy.types.UILayout, context: bpy.types.Context) -> No
         row.prop(survey, name, text=name.capitalize() if is_narrow(context) else None)
         if wrong:
             draw_sentence(column, wrong, icon="ERROR", alert=True)
-    if any(_looks_one_way(key) for key in survey.used_types()):
-        column.prop(survey, "yaws")
-
-
-def _looks_one_way(key: str) -> bool:
-    model = session.sensor_types.get(key)
-    return model is not None and not model.all_round
 
 
 def _draw_about(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:

@@ -5,7 +5,10 @@ from __future__ import annotations
 import bpy
 
 from ..viewport.overlays import TAB
+from .wrapped_text import MARGIN, draw_sentence, sidebar_width, text_width
 
+FIELD = 34.0
+"""Width that the margins of a field and its button for files take, pixels at the interface's usual scale."""
 NARROW = 250
 """Pixels at the interface's usual scale."""
 
@@ -45,6 +48,25 @@ def settings_column(layout: bpy.types.UILayout) -> bpy.types.UILayout:
     column.use_property_split = not is_narrow(bpy.context)
     column.use_property_decorate = False
     return column
+
+
+def draw_path(
+    layout: bpy.types.UILayout,
+    owner: bpy.types.PropertyGroup,
+    name: str,
+    placeholder: str = "",
+    *,
+    named: bool = True,
+) -> None:
+    """Draw a file or folder over the whole width, and below the field again if it has no room there."""
+    column = layout.column(align=True)
+    column.use_property_split = False
+    if named:
+        column.label(text=owner.bl_rna.properties[name].name)
+    column.prop(owner, name, text="", placeholder=placeholder)
+    path = getattr(owner, name)
+    if text_width(path) > sidebar_width() - MARGIN - FIELD:
+        draw_sentence(column, path)
 
 
 def is_narrow(context: bpy.types.Context) -> bool:

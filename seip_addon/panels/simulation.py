@@ -11,7 +11,7 @@ from ..operators.simulation import SEIP_OT_simulate_traffic, why_no_simulation
 from . import sumo
 from .run_button import draw_run
 from .sections import Status
-from .sidebar import settings_column
+from .sidebar import draw_path, settings_column
 from .wrapped_text import draw_sentence
 
 USED = "Detection and placements in traffic use these runs."
@@ -31,9 +31,10 @@ def draw(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     sumo.draw_missing(layout)
     column = settings_column(layout)
     found = simulation.street_map()
-    column.prop(simulation, "map", placeholder="OpenDRIVE (.xodr)" if found is None else Path(found.name).name)
-    for name in ("flow", "pedestrians", "duration", "count", "folder"):
+    for name in ("flow", "pedestrians", "duration", "count"):
         column.prop(simulation, name)
+    draw_path(layout, simulation, "map", placeholder="OpenDRIVE (.xodr)" if found is None else Path(found.name).name)
+    draw_path(layout, simulation, "folder")
     reason = why_no_simulation(scene)
     if reason and preferences.sumo() is not None:  # else the sentence is there already
         draw_sentence(layout, reason, icon="INFO")

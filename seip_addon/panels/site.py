@@ -27,8 +27,8 @@ from ..scene import roles
 from . import sumo
 from .run_button import draw_run
 from .sections import Status, draw_sections
-from .sidebar import is_narrow, settings_column
-from .wrapped_text import draw_sentence
+from .sidebar import draw_path, is_narrow, settings_column
+from .wrapped_text import ICON, MARGIN, draw_lines, draw_sentence, wrapped
 
 TARGETS = "Targets"
 """Count of the check that the header shows."""
@@ -79,7 +79,7 @@ def _draw_map(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
         sumo.draw_missing(layout)
     _draw_place(layout, site)
     draw_sentence(layout, _place_text(site), icon="INFO")
-    draw_sections(layout, {"sources": _draw_all_sources}, site)
+    draw_sections(layout, {"sources": _draw_sources}, site)
     if has_site(scene) and not missing_for_build(scene):
         again = "The site is built again; your own objects and the sensors stay."
         elsewhere = "The site is built in a new scene; this one stays."
@@ -118,9 +118,7 @@ class SEIP_OT_choose_place(bpy.types.Operator):
         site, layout = context.scene.seip.site, self.layout
         layout.label(text=bpy.path.basename(site.source), icon="FILE", translate=False)
         _draw_place(layout, site)
-        column = settings_column(layout)
-        _draw_sources(column, site)
-        column.row().prop(site, "terrain_epsg")
+        _draw_sources(layout, site)
         if site.is_extract() and preferences.sumo() is None:
             sumo.draw_installation(layout, in_one_row=True)
         elif site.is_extract():
@@ -129,7 +127,8 @@ class SEIP_OT_choose_place(bpy.types.Operator):
         if missing == preferences.NO_SUMO and preferences.why_no_installation():
             missing = f"{missing}. {preferences.why_no_installation()}"
         text, icon = (f"{missing}.", "ERROR") if missing else (_place_text(site), "INFO")
-        draw_sentence(layout, text, icon=icon, width=DIALOG_WIDTH, least_lines=MESSAGE_LINES)
+        lines = wrapped(text, MARGIN + ICON, DIALOG_WIDTH)
+        draw_lines(layout, lines + [""] * (MESSAGE_LINES - len(lines)), icon)
 
     def execute(self, context: bpy.types.Context) -> Outcome:
         """Build the site, or show the dialog again, with what is missing."""
@@ -157,19 +156,15 @@ def _draw_place(layout: bpy.types.UILayout, site: SEIP_PG_site) -> None:
     size.prop(site, "radius", text="Along Them" if site.follows_approaches() else "Radius")
 
 
-def _draw_sources(column: bpy.types.UILayout, site: SEIP_PG_site) -> None:
+def _draw_sources(layout: bpy.types.UILayout, site: SEIP_PG_site) -> None:
     """Draw further files of the site."""
-    row = column.row()
+    row = layout.row()
     row.enabled = not site.is_extract()  # which has its own buildings, trees and posts
-    row.prop(site, "osm")
-    column.prop(site, "terrain")
-
-
-def _draw_all_sources(layout: bpy.types.UILayout, site: SEIP_PG_site) -> None:
-    column = settings_column(layout)
-    _draw_sources(column, site)
-    if site.terrain:
-        column.prop(site, "terrain_epsg")
+    draw_path(row, site, "osm")
+    draw_path(layout, site, "terrain")
+    row = settings_column(layout)
+    row.enabled = bool(site.terrain)
+    row.prop(site, "terrain_epsg")
 
 
 def _place_text(site: SEIP_PG_site) -> str:

@@ -16,7 +16,7 @@ from ..session import session
 from . import detection, simulation, verification
 from .run_button import draw_run
 from .sections import Status, draw_sections
-from .sidebar import settings_column
+from .sidebar import draw_path, settings_column
 from .wrapped_text import draw_sentence
 
 
@@ -34,11 +34,11 @@ def draw(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     """Draw where traffic comes from."""
     traffic = context.scene.seip.traffic
     column = layout.column(align=True)
-    column.prop(traffic, "file", text="", placeholder="Traffic (.npz, .xml)")
+    draw_path(column, traffic, "file", "Traffic (.npz, .xml)", named=False)
     files = traffic.files()
     if files is not None and not files.trajectories:
-        column.prop(traffic, "routes", text="", placeholder="Routes (vehicle types)")
-        column.prop(traffic, "net", text="", placeholder="Network (.net.xml)")
+        draw_path(column, traffic, "routes", "Routes (vehicle types)", named=False)
+        draw_path(column, traffic, "net", "Network (.net.xml)", named=False)
     reason = why_no_load(context.scene)
     if reason and traffic.file:  # an empty field says so itself
         draw_sentence(layout, reason, icon="INFO")
@@ -86,8 +86,8 @@ def _draw_dataset(layout: bpy.types.UILayout, context: bpy.types.Context) -> Non
     if why_not:
         draw_sentence(layout, why_not, icon="INFO")
         return
+    draw_path(layout, traffic, "folder")
     column = settings_column(layout)
-    column.prop(traffic, "folder")
     column.prop(traffic, "whole")
     if not traffic.whole:
         column.prop(traffic, "start")

@@ -14,13 +14,14 @@ from ..operators.verification import (
     why_no_verification,
 )
 from .run_button import draw_run
+from .sidebar import draw_path
 from .wrapped_text import BOX, draw_sentence
 
 
 def draw(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     """Draw the recording, the button, and what the last verification found."""
     scene = context.scene
-    layout.prop(scene.seip.verification, "recording", text="", placeholder="Recording (folder, .pcap)")
+    draw_path(layout, scene.seip.verification, "recording", "Recording (folder, .pcap)", named=False)
     reason = why_no_verification(scene)
     if reason and reason != NO_RECORDING:  # an empty field says so itself
         draw_sentence(layout, reason, icon="INFO")

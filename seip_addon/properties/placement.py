@@ -60,36 +60,36 @@ class SEIP_PG_goal(bpy.types.PropertyGroup):
     central_weight: FloatProperty(
         name="Weight", description="Weight of targets in weighted regions; others have 1", default=2.0, min=0.001
     )
-    min_distance: of_setting(Objective, "min_distance", "Min. Distance")
+    min_distance: of_setting(Objective, "min_distance", "Least Distance")
     criterion: of_setting(
         Objective,
         "criterion",
-        "Criterion",
+        "Maximise",
         items=(
-            ("auto", "By Sensor", "Returns from road users for products, the road seen for the paper's sensor types"),
+            ("auto", "Automatic", "Returns from road users for products, the road seen for the paper's sensor types"),
             ("road", "Road Seen", "The share of the road that sensors see"),
             ("returns", "Returns", "The expected returns from cars, cyclists and pedestrians"),
         ),
     )
     scenarios: EnumProperty(
-        name="Scenarios",
+        name="Conditions",
         description="Conditions that the placement is optimised for",
         items=(
-            ("nominal", "Nominal", "Poses as planned on the empty road"),
-            ("pose-errors", "Pose Errors", "Random errors of the sensors' poses"),
+            ("nominal", "As Planned", "Sensors exactly where they are planned, on the empty road"),
+            ("pose-errors", "Mounting Errors", "Random errors of the sensors' positions and tilts"),
             ("traffic", "Traffic", "Instants of traffic at which vehicles block the view"),
         ),
     )
     risk: of_setting(
         Objective,
         "risk",
-        "Risk Measure",
+        "Average Over",
         items=(
-            ("auto", "Default", "Worst quarter of pose errors, mean of traffic"),
-            ("none", "Evaluate Only", "Optimise for nominal poses and the empty road, and report the loss"),
-            ("mean", "Mean", "Mean over the scenarios"),
-            ("worst-quarter", "Worst Quarter", "Mean over the worst quarter of the scenarios (CVaR)"),
-            ("worst", "Worst", "The worst of the scenarios"),
+            ("auto", "Automatic", "The worst quarter of mounting errors, all instants of traffic"),
+            ("none", "Evaluate Only", "Optimise for sensors as planned on the empty road, and report the loss"),
+            ("mean", "All Cases", "Mean over all cases"),
+            ("worst-quarter", "Worst Quarter", "Mean over the worst quarter of the cases"),
+            ("worst", "Worst Case", "The worst case only"),
         ),
     )
     position_error: of_setting(PoseErrors, "position", "Position Error", min=0.0)

@@ -86,7 +86,7 @@ def files(folder):
 def test_without_torch_one_sentence_says_what_to_install_and_where(placed, monkeypatch):
     monkeypatch.setattr(preferences, "find_spec", lambda _: None)
     assert preferences.detecting_python() is None
-    sentence = r"needs a Python with PyTorch: .*pip install '\.\[detection\]'.*in the extension's preferences\."
+    sentence = r"PyTorch, named in the extension's preferences: .*pip install 'FILE\.zip\[detection\]'.* checkout\."
     with pytest.raises(RuntimeError, match=sentence):
         bpy.ops.seip.detect()
     with pytest.raises(RuntimeError, match=sentence):

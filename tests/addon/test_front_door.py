@@ -13,7 +13,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from seip_addon import loose_pieces, scene_status
 from seip_addon.operators.base import LongWork
-from seip_addon.panels import detection, export, front_door, results, sections, view
+from seip_addon.panels import detection, export, front_door, results, sections, view, wrapped_text
 from seip_addon.scene import contract
 from seip_addon.scene.read import read_scene
 from seip_addon.scene.sensors import placed_sensors
@@ -177,6 +177,14 @@ def test_the_header_of_some_section_shows_the_work_of_each_operator(scene):
 
     long = {kind.bl_idname.partition(".")[2] for kind in kinds(LongWork) if hasattr(kind, "bl_idname")}
     assert set().union(*sections.WORK.values()) == long
+
+
+@pytest.mark.parametrize("width", [90.0, 160.0, 420.0])
+def test_no_line_is_wider_than_its_room_and_no_letter_of_a_path_is_lost(scene, width):
+    text = "written to /home/somebody/a/very/long/path_that_has_no_blank/and-goes-on/result/placement.json at once"
+    lines = wrapped_text.wrapped(text, 30.0, width)
+    assert max(map(wrapped_text.text_width, lines)) <= width - 30.0
+    assert "".join(lines).replace(" ", "") == text.replace(" ", "")
 
 
 def test_all_sections_open_without_and_with_a_placement(junction, monkeypatch):

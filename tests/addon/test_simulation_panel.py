@@ -43,7 +43,7 @@ def drawn():
 
 @needs_sumo
 def test_runs_are_those_of_the_command_and_used_by_the_next_buttons(site, tmp_path):
-    assert dict(drawn().properties)["map"] == {"placeholder": "junction.xodr"}
+    assert dict(drawn().properties)["map"]["placeholder"] == "junction.xodr"
     assert bpy.ops.seip.simulate_traffic() == {"FINISHED"}
     scene, seip = site, site.seip
     assert (seip.detection.runs, seip.goal.runs) == ("//seip-traffic/", "//seip-traffic/")
