@@ -175,31 +175,9 @@ class SEIP_OT_add_rule(bpy.types.Operator):
         goal.position = ""
 
 
-class SEIP_OT_remove_rule(bpy.types.Operator):
-    """Remove the rule from the list"""
-
-    bl_idname = "seip.remove_rule"
-    bl_label = "Remove Rule"
-    bl_options = {"REGISTER", "UNDO"}
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """Return whether there is a rule to remove."""
-        goal = context.scene.seip.goal
-        return goal.active_rule in range(len(goal.rules))
-
-    def execute(self, context: bpy.types.Context) -> Outcome:
-        """Remove the active one."""
-        goal = context.scene.seip.goal
-        goal.rules.remove(goal.active_rule)
-        goal.active_rule = max(0, goal.active_rule - 1)
-        return {"FINISHED"}
-
-
 CLASSES = (
     SEIP_OT_solve_placement,
     SEIP_OT_judge_placement,
     SEIP_OT_choose_number,
     SEIP_OT_add_rule,
-    SEIP_OT_remove_rule,
 )

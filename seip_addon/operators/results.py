@@ -159,24 +159,30 @@ def _free_name(taken: set[str]) -> str:
     return next(name for name in (f"Placement {n}" for n in range(1, len(taken) + 2)) if name not in taken)
 
 
-class SEIP_OT_drop_placement(bpy.types.Operator):
-    """Remove the kept placement that is active in the list"""
+class SEIP_OT_remove_entry(bpy.types.Operator):
+    """Remove the active entry of the list"""
 
-    bl_idname = "seip.drop_placement"
-    bl_label = "Remove Kept Placement"
+    bl_idname = "seip.remove_entry"
+    bl_label = "Remove"
     bl_options = {"REGISTER", "UNDO"}
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """Return whether there is one."""
-        seip = context.scene.seip
-        return seip.active_kept in range(len(seip.kept))
+    of: bpy.props.EnumProperty(
+        name="List",
+        description="List that the entry is removed from",
+        items=(("RULES", "Rules", "Positions with a rule"), ("KEPT", "Placements", "Placements that were kept")),
+    )
 
     def execute(self, context: bpy.types.Context) -> Outcome:
-        """Remove it from the list."""
+        """Remove it, if there is one."""
         seip = context.scene.seip
-        seip.kept.remove(seip.active_kept)
-        seip.active_kept = max(0, seip.active_kept - 1)
+        owner, entries, active = (seip.goal, seip.goal.rules, "active_rule")
+        if self.of == "KEPT":
+            owner, entries, active = (seip, seip.kept, "active_kept")
+        number = getattr(owner, active)
+        if number not in range(len(entries)):
+            return {"CANCELLED"}
+        entries.remove(number)
+        setattr(owner, active, max(0, number - 1))
         return {"FINISHED"}
 
 
@@ -441,7 +447,7 @@ def _holds(folder: Path, record: str, _written: int | None) -> bool:
 CLASSES = (
     SEIP_OT_look_from_sensor,
     SEIP_OT_keep_placement,
-    SEIP_OT_drop_placement,
+    SEIP_OT_remove_entry,
     SEIP_OT_show_comparison,
     SEIP_OT_follow_sensors,
     SEIP_OT_evaluate_sensors,

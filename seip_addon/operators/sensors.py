@@ -16,59 +16,6 @@ from ..viewport import beam_preview
 from .base import Conditional, Outcome, attempt
 
 
-class SEIP_OT_list_sensor_types(bpy.types.Operator):
-    """Read the catalogues again and list new types"""
-
-    bl_idname = "seip.list_sensor_types"
-    bl_label = "Read Catalogues"
-    bl_options = {"REGISTER", "UNDO"}
-
-    def execute(self, _context: bpy.types.Context) -> Outcome:
-        """Read them."""
-        sensor_types.refresh()
-        if session.catalogue_error:
-            self.report({"ERROR"}, session.catalogue_error)
-            return {"CANCELLED"}
-        self.report({"INFO"}, counted(len(session.sensor_types), "sensor type"))
-        return {"FINISHED"}
-
-
-class SEIP_OT_drop_sensor_type(bpy.types.Operator):
-    """Remove this sensor from the choice"""
-
-    bl_idname = "seip.drop_sensor_type"
-    bl_label = "Remove Sensor"
-    bl_options = {"REGISTER", "UNDO"}
-
-    key: bpy.props.StringProperty(name="Key", description="Catalogue key of the sensor type")
-
-    def execute(self, context: bpy.types.Context) -> Outcome:
-        """Take it out of the choice."""
-        types = context.scene.seip.survey.types
-        if self.key not in types:
-            self.report({"ERROR"}, f"there is no sensor type {self.key!r} in the list")
-            return {"CANCELLED"}
-        types[self.key].use = False
-        return {"FINISHED"}
-
-
-class SEIP_OT_about_sensor(bpy.types.Operator):
-    """Show the figures of this sensor and their sources"""
-
-    bl_idname = "seip.about_sensor"
-    bl_label = "About the Sensor"
-    bl_options = {"INTERNAL"}
-
-    key: bpy.props.StringProperty(name="Key", description="Catalogue key of the sensor type")
-
-    def execute(self, context: bpy.types.Context) -> Outcome:
-        """Open the section with the figures."""
-        seip = context.scene.seip
-        seip.survey.about = self.key
-        context.window_manager.seip_sections.about_sensor = True
-        return {"FINISHED"}
-
-
 class _EditsCatalogues(Conditional):
     """A mixin for operators on the list of catalogues, which preferences keep."""
 
@@ -188,9 +135,6 @@ class SEIP_OT_add_survey_preset(AddPresetBase, bpy.types.Operator):
 
 
 CLASSES = (
-    SEIP_OT_list_sensor_types,
-    SEIP_OT_drop_sensor_type,
-    SEIP_OT_about_sensor,
     SEIP_OT_add_catalogue,
     SEIP_OT_remove_catalogue,
     SEIP_OT_empty_cache,

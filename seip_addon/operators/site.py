@@ -290,55 +290,28 @@ def has_site(scene: bpy.types.Scene) -> bool:
     return any(contract.base_name(collection) in contract.INPUTS for collection in scene.collection.children_recursive)
 
 
-class _RoleOperator(Conditional):
-    """A mixin for operators on the selected objects and a role."""
+class SEIP_OT_assign_role(_WritesScene, bpy.types.Operator):
+    """Link the selected objects to the collection of a role, or remove them from it; other collections stay"""
 
+    bl_idname = "seip.assign_role"
+    bl_label = "Assign"
     bl_options = {"REGISTER", "UNDO"}
 
     role: bpy.props.EnumProperty(name="Role", description="Role of the objects in the placement", items=ROLE_ITEMS)
+    remove: bpy.props.BoolProperty(name="Remove", description="Take the objects out of the role", default=False)
 
     @classmethod
     def why_not(cls, context: bpy.types.Context) -> str:
         """Return a reason if nothing is selected or the scene is linked from another file."""
-        return why_no_role(context)
-
-
-NOTHING_SELECTED = "Select objects first"
-
-
-def why_no_role(context: bpy.types.Context) -> str:
-    """Say why no role can be given or taken, or nothing."""
-    return scene_status.not_own(context.scene) or ("" if context.selected_objects else NOTHING_SELECTED)
-
-
-class SEIP_OT_assign_role(_RoleOperator, bpy.types.Operator):
-    """Link the selected objects to the collection of a role; other roles and collections stay"""
-
-    bl_idname = "seip.assign_role"
-    bl_label = "Assign"
+        return super().why_not(context) or ("" if context.selected_objects else "Select objects first")
 
     def execute(self, context: bpy.types.Context) -> Outcome:
-        """Link them."""
+        """Link or unlink them."""
         return attempt(self, lambda: self._assign(context, Role[self.role]))
 
     def _assign(self, context: bpy.types.Context, role: Role) -> None:
-        count = roles.assign(context.scene, context.selected_objects, role)
-        self.report({"INFO"}, f"{count} assigned to the {role.value}")
-
-
-class SEIP_OT_take_out_of_role(_RoleOperator, bpy.types.Operator):
-    """Unlink the selected objects from the collections of a role; other roles and collections stay"""
-
-    bl_idname = "seip.take_out_of_role"
-    bl_label = "Remove"
-
-    def execute(self, context: bpy.types.Context) -> Outcome:
-        """Unlink them."""
-        return attempt(self, lambda: self._take_out(context, Role[self.role]))
-
-    def _take_out(self, context: bpy.types.Context, role: Role) -> None:
-        count = roles.take_out(context.scene, context.selected_objects, role)
-        self.report({"INFO"}, f"{count} taken out of the {role.value}")
+        change, what = (roles.take_out, "taken out of") if self.remove else (roles.assign, "assigned to")
+        self.report({"INFO"}, f"{change(context.scene, context.selected_objects, role)} {what} the {role.value}")
 
 
 class SEIP_OT_add_area(_WritesScene, bpy.types.Operator):
@@ -523,7 +496,6 @@ CLASSES = (
     SEIP_OT_build_site,
     SEIP_OT_load_example,
     SEIP_OT_assign_role,
-    SEIP_OT_take_out_of_role,
     SEIP_OT_add_area,
     SEIP_OT_check_site,
     SEIP_OT_show_problem,

@@ -139,18 +139,6 @@ def _scanned(read: _SceneRead, at: float, before: LastScan | None) -> Generator[
     return last_scan.measure(run, simulation, at)
 
 
-class SEIP_OT_hide_scan(bpy.types.Operator):
-    """Hide the point cloud"""
-
-    bl_idname = "seip.hide_scan"
-    bl_label = "Hide Point Cloud"
-
-    def execute(self, context: bpy.types.Context) -> Outcome:
-        """Hide it."""
-        last_scan.hide_cloud(context.scene)
-        return {"FINISHED"}
-
-
 class SEIP_OT_write_dataset(_Scanning[tuple[Record, tuple[str, ...]]], bpy.types.Operator):
     """Scan all frames and write them with the boxes of all road users, as datasets for training detectors"""
 
@@ -220,6 +208,5 @@ CLASSES = (
     SEIP_OT_load_traffic,
     SEIP_OT_clear_traffic,
     SEIP_OT_scan_frame,
-    SEIP_OT_hide_scan,
     SEIP_OT_write_dataset,
 )

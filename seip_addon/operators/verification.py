@@ -39,7 +39,6 @@ from ..session import LastVerification, session
 from .base import Conditional, LongWork, Outcome, attempt
 from .detection import folder_of_result
 from .results import no_folder
-from .view import show_picture
 
 NO_SENSORS = "There is no sensor to verify: place sensors first."
 NO_RECORDING = "Name a recording of the installed sensors: a folder of sweeps, or a .pcap."
@@ -77,6 +76,11 @@ def why_no_correction(scene: bpy.types.Scene) -> str:
 def sentences_of(scene: bpy.types.Scene) -> tuple[str, ...]:
     """Return what the last verification of a scene found; the file keeps it."""
     return tuple(scene.seip.verification.found.splitlines())
+
+
+def picture_of(scene: bpy.types.Scene) -> Path:
+    """Return where the picture of a scene's last verification was written."""
+    return _folder_of(scene) / CHANGES
 
 
 def _folder_of(scene: bpy.types.Scene) -> Path:
@@ -175,21 +179,4 @@ class SEIP_OT_correct_scene(Conditional, bpy.types.Operator):
         self.report({"INFO"}, "the scene is as recorded; its placement is stale")
 
 
-class SEIP_OT_show_changes(bpy.types.Operator):
-    """Show the recording and its differences from the scene in the render window"""
-
-    bl_idname = "seip.show_changes"
-    bl_label = "Show Picture"
-    bl_options = {"INTERNAL"}  # the panel offers it where there is a verification
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """Return whether there is a verification."""
-        return bool(sentences_of(context.scene))
-
-    def execute(self, context: bpy.types.Context) -> Outcome:
-        """Open it."""
-        return attempt(self, lambda: show_picture(context, _folder_of(context.scene) / CHANGES))
-
-
-CLASSES = (SEIP_OT_verify, SEIP_OT_correct_scene, SEIP_OT_show_changes)
+CLASSES = (SEIP_OT_verify, SEIP_OT_correct_scene)

@@ -7,7 +7,7 @@ from pathlib import Path
 import bpy
 
 from ..operators import results
-from ..operators.view import SEIP_OT_save_picture, SEIP_OT_show_plan
+from ..operators.view import SEIP_OT_save_picture
 from .run_button import draw_run
 from .sidebar import draw_path
 from .wrapped_text import draw_sentence
@@ -39,7 +39,7 @@ def _draw_files(layout: bpy.types.UILayout, files: dict[str, Path]) -> None:
         return
     row = layout.row(align=True)
     if results.PLAN in files:
-        row.operator(SEIP_OT_show_plan.bl_idname, icon="IMAGE_DATA")
+        row.operator("wm.path_open", text="Open Plan", icon="IMAGE_DATA").filepath = str(files[results.PLAN])
     if results.REPORT in files:
         row.operator("wm.path_open", text="Open Report", icon="URL").filepath = str(files[results.REPORT])
     row.operator("wm.path_open", text="", icon="FILE_FOLDER").filepath = str(next(iter(files.values())).parent)

@@ -152,7 +152,7 @@ def _draw_rules(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
         row = layout.row()
         rows = len(goal.rules)
         row.template_list(SEIP_UL_rules.bl_idname, "", goal, "rules", goal, "active_rule", rows=rows, maxrows=rows)
-        row.operator("seip.remove_rule", text="", icon="REMOVE")
+        row.operator("seip.remove_entry", text="", icon="REMOVE").of = "RULES"
     layout.prop(goal, "position", text="", icon="VIEWZOOM", placeholder="Position, or the selected pole")
     row = layout.row(align=True)
     row.operator("seip.add_rule", text="Sensor", icon="CHECKMARK").rule = "MANDATORY"

@@ -71,9 +71,7 @@ class SEIP_AP_preferences(bpy.types.AddonPreferences):
             row = layout.row(align=True)
             row.prop(file, "path", text="")
             row.operator("seip.remove_catalogue", text="", icon="X").index = number
-        row = layout.row(align=True)
-        row.operator("seip.add_catalogue", icon="ADD")
-        row.operator("seip.list_sensor_types", icon="FILE_REFRESH")
+        layout.operator("seip.add_catalogue", icon="ADD")
 
 
 CLASSES = (SEIP_PG_catalogue_file, SEIP_AP_preferences)

@@ -118,7 +118,7 @@ def _draw_comparison(layout: bpy.types.UILayout, context: bpy.types.Context) -> 
     _draw_list(row, SEIP_UL_kept, seip, "kept", "active_kept")
     column = row.column(align=True)
     column.operator("seip.keep_placement", text="", icon="ADD")
-    column.operator("seip.drop_placement", text="", icon="REMOVE")
+    column.operator("seip.remove_entry", text="", icon="REMOVE").of = "KEPT"
     if not 0 <= seip.active_kept < len(seip.kept):
         draw_sentence(layout, "Keep this placement with +, place again, and compare the two.", icon="INFO")
         return

@@ -12,7 +12,7 @@ from ..core.sensing.returns.bodies import PANELS
 from ..core.sensing.visibility.road_range import upright_range
 from ..core.sensing.visibility.settings import VisibilitySettings
 from ..operators.base import Outcome
-from ..operators.sensors import SEIP_OT_add_catalogue, SEIP_OT_list_sensor_types
+from ..operators.sensors import SEIP_OT_add_catalogue
 from ..session import session
 
 WIDTH = 760
@@ -44,9 +44,7 @@ class SEIP_OT_choose_sensors(bpy.types.Operator):
         survey, layout = context.scene.seip.survey, self.layout
         layout.prop(survey, "filter", text="", icon="VIEWZOOM", placeholder="Manufacturer or product")
         draw_table(layout, survey)
-        row = layout.row()
-        row.operator(SEIP_OT_add_catalogue.bl_idname, icon="ADD")
-        row.operator(SEIP_OT_list_sensor_types.bl_idname, icon="FILE_REFRESH")
+        layout.operator(SEIP_OT_add_catalogue.bl_idname, icon="ADD")
 
 
 def draw_table(layout: bpy.types.UILayout, survey: bpy.types.PropertyGroup) -> None:

@@ -13,7 +13,7 @@ from ..core.sensing.visibility.ring_resolution import unresolved_from
 from ..core.sensing.visibility.road_range import road_range
 from ..core.sensing.visibility.settings import VisibilitySettings
 from ..operators.results import no_placement
-from ..operators.sensors import SEIP_OT_about_sensor, SEIP_OT_drop_sensor_type, SEIP_OT_preview_beams
+from ..operators.sensors import SEIP_OT_preview_beams
 from ..scene.materials import REFLECTIVITY
 from ..session import session
 from ..viewport import beam_preview
@@ -77,8 +77,9 @@ def _draw_product(layout: bpy.types.UILayout, key: str) -> None:
         price = row.row(align=True)
         price.alignment = "RIGHT"
         price.label(text=f"${model.price:,.0f}", translate=False)
-    row.operator(SEIP_OT_about_sensor.bl_idname, text="", icon="INFO", emboss=False).key = key
-    row.operator(SEIP_OT_drop_sensor_type.bl_idname, text="", icon="X", emboss=False).key = key
+    item = bpy.context.scene.seip.survey.types.get(key)
+    if item is not None:
+        row.prop(item, "use", text="", icon="X", emboss=False)
 
 
 def _draw_mounting(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
@@ -96,6 +97,7 @@ def _draw_mounting(layout: bpy.types.UILayout, context: bpy.types.Context) -> No
 def _draw_about(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     """Draw the figures of a chosen product, and what they rest on."""
     survey = context.scene.seip.survey
+    layout.prop_search(survey, "about", survey, "types", text="", icon="VIEWZOOM")
     model = session.sensor_types.get(survey.shown_type())
     if model is None:
         draw_sentence(layout, "Choose a sensor that is in the catalogue.", icon="INFO")

@@ -16,7 +16,6 @@ from ..operators.site import (
     SEIP_OT_download_map,
     SEIP_OT_load_example,
     SEIP_OT_show_problem,
-    SEIP_OT_take_out_of_role,
     has_site,
     in_short,
     is_of_choice,
@@ -218,7 +217,8 @@ def _draw_roles(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     layout.prop(site, "role", text="")
     row = layout.row(align=True)
     row.operator(SEIP_OT_assign_role.bl_idname, icon="ADD").role = site.role
-    row.operator(SEIP_OT_take_out_of_role.bl_idname, icon="REMOVE").role = site.role
+    button = row.operator(SEIP_OT_assign_role.bl_idname, text="Remove", icon="REMOVE")
+    button.role, button.remove = site.role, True
     if Role[site.role] in roles.AREAS:
         row = layout.column(align=True) if is_narrow(context) else layout.row(align=True)
         for place, text in (("CURSOR", "Draw at Cursor"), ("VIEW", "Draw in View")):

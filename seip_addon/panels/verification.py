@@ -7,8 +7,8 @@ import bpy
 from ..operators.verification import (
     NO_RECORDING,
     SEIP_OT_correct_scene,
-    SEIP_OT_show_changes,
     SEIP_OT_verify,
+    picture_of,
     sentences_of,
     why_no_correction,
     why_no_verification,
@@ -37,4 +37,4 @@ def draw(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
         draw_sentence(box, changed, icon="INFO", reserved=BOX)
     row = box.row(align=True)
     row.operator(SEIP_OT_correct_scene.bl_idname, icon="ADD")
-    row.operator(SEIP_OT_show_changes.bl_idname, icon="IMAGE_DATA")
+    row.operator("wm.path_open", text="Show Picture", icon="IMAGE_DATA").filepath = str(picture_of(scene))

@@ -9,15 +9,14 @@ from ..core.output.pictures.coverage_colours import Aspect
 from ..operators.results import no_placement
 from ..operators.view import (
     SEIP_OT_colour_coverage,
-    SEIP_OT_hide_sight_lines,
-    SEIP_OT_show_coverage_colours,
+    SEIP_OT_hide_overlay,
     SEIP_OT_show_sight_lines,
-    SEIP_OT_toggle_legend,
     why_no_coverage,
 )
 from ..scene.write import ASPECT, aspects_of, coverage_of
 from ..session import session
 from ..viewport import coverage, overlays
+from ..viewport.point_cloud import NAME as CLOUD
 from ..viewport.sight_lines import NAME as SIGHT
 from .run_button import draw_run, is_running
 from .wrapped_text import draw_sentence
@@ -42,8 +41,7 @@ def _draw_coverage(layout: bpy.types.UILayout, context: bpy.types.Context) -> No
     column = layout.column(align=True)
     head = column.row()
     head.label(text="Coverage")
-    shown = overlays.find(context.scene, coverage.NAME) is not None
-    head.operator(SEIP_OT_toggle_legend.bl_idname, text="", icon="INFO", depress=shown)
+    head.prop(context.scene.seip.view, "legend", text="", icon="INFO")
     obj = coverage_of(context.scene)
     row = column.row(align=True)
     possible = ASPECTS if obj is None else aspects_of(obj)
@@ -59,8 +57,8 @@ def _draw_coverage(layout: bpy.types.UILayout, context: bpy.types.Context) -> No
     if why_not:
         draw_sentence(column, why_not, icon="INFO")
     elif not coverage.shows_coverage(context.space_data):
-        draw_sentence(column, "This view's shading does not show the colours.", icon="ERROR")
-        column.operator(SEIP_OT_show_coverage_colours.bl_idname)
+        text = "This view's shading does not show the colours: press one of them."
+        draw_sentence(column, text, icon="ERROR")
 
 
 def _draw_sight(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
@@ -71,7 +69,7 @@ def _draw_sight(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     words = "From Sensor" if overlay is None else overlay.about
     row.operator_menu_enum(SEIP_OT_show_sight_lines.bl_idname, "sensor", text=words, icon="LIGHT_SPOT")
     if overlay is not None:
-        row.operator(SEIP_OT_hide_sight_lines.bl_idname, text="", icon="X")
+        row.operator(SEIP_OT_hide_overlay.bl_idname, text="", icon="X").name = SIGHT
     if is_running(SEIP_OT_show_sight_lines.bl_idname):
         draw_run(column, SEIP_OT_show_sight_lines.bl_idname)
     why_not = no_placement(context.scene)
@@ -83,4 +81,4 @@ def _draw_cloud(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     column = layout.column(align=True)
     column.label(text="Point Cloud")
     column.row(align=True).prop(context.scene.seip.view, "cloud_colour", expand=True)
-    column.operator("seip.hide_scan", icon="X")
+    column.operator(SEIP_OT_hide_overlay.bl_idname, icon="X").name = CLOUD

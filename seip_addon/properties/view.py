@@ -6,17 +6,25 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, StringProperty
 
 from .. import last_scan
+from ..viewport import coverage
 
 
 def _recolour(_own: object, context: bpy.types.Context) -> None:
     last_scan.show_cloud(context.scene)
 
 
+def _show_legend(own: bpy.types.PropertyGroup, _context: object) -> None:
+    coverage.update(own.id_data)
+
+
 class SEIP_PG_view(bpy.types.PropertyGroup):
     """Display settings of the results."""
 
     legend: BoolProperty(
-        name="Legend", description="Show the legend of the coverage colours, and the sensors' labels", default=True
+        name="Legend",
+        description="Show the legend of the coverage colours, and the sensors' labels",
+        default=True,
+        update=_show_legend,
     )
     cloud_colour: EnumProperty(
         name="Point Colours",

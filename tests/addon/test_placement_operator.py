@@ -11,7 +11,7 @@ from headless import place
 import bpy
 import pytest
 
-from seip_addon import scene_status
+from seip_addon import scene_status, sensor_types
 from seip_addon.core.choosing.placement.scenarios import DEFAULT_COUNTS
 from seip_addon.core.output.results.placement_file import comparable, load_placement, parsed_record
 from seip_addon.core.progress import Progress, finish
@@ -42,7 +42,8 @@ def test_panel_and_batch_write_the_same_placement(junction, tmp_path, small_scen
         encoding="utf-8"
     )
     key = session.state_of(junction).survey.grid.key
-    assert offered() == [str(tmp_path / "panel" / "report.html"), str(tmp_path / "panel")]
+    written = tmp_path / "panel"
+    assert offered() == [str(path) for path in (written / "plan.png", written / "report.html", written)]
     junction.seip.goal.count = 1
     bpy.ops.seip.solve_placement()
     assert offered() == []  # the files are not of this placement
@@ -186,8 +187,9 @@ def test_rules_come_from_what_is_selected_and_hold(junction):
     assert [(one.name, one.rule) for one in junction.seip.goal.rules] == [(position, "MANDATORY")]
     bpy.ops.seip.solve_placement()
     assert position in {obj["seip_position"] for obj in placed_sensors(junction).values()}
-    assert bpy.ops.seip.remove_rule() == {"FINISHED"}
-    assert not bpy.ops.seip.remove_rule.poll()
+    assert bpy.ops.seip.remove_entry(of="RULES") == {"FINISHED"}
+    assert not junction.seip.goal.rules
+    assert bpy.ops.seip.remove_entry(of="RULES") == {"CANCELLED"}
 
 
 def test_a_file_of_a_newer_version_is_refused(junction, tmp_path):
@@ -209,7 +211,7 @@ def test_panel_and_batch_place_alike_over_pose_errors(junction, tmp_path, small_
     goal.position_error, goal.tilt_error = 0.5, math.radians(3)
     types = junction.seip.survey
     types.grid, types.spacing = 8.0, 25.0
-    bpy.ops.seip.list_sensor_types()
+    sensor_types.refresh()
     for one in types.types:
         one.use = one.name == "type1"
     assert bpy.ops.seip.solve_placement() == {"FINISHED"}

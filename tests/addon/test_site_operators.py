@@ -116,9 +116,9 @@ def test_roles_by_operator(scene):
     bpy.ops.mesh.primitive_plane_add()
     assert bpy.ops.seip.assign_role(role="ROADS") == {"FINISHED"}
     assert bpy.context.object in contract.find(scene, contract.ROADS).objects[:]
-    assert bpy.ops.seip.take_out_of_role(role="ROADS") == {"FINISHED"}
+    assert bpy.ops.seip.assign_role(role="ROADS", remove=True) == {"FINISHED"}
     with pytest.raises(RuntimeError, match="nothing to take out"):
-        bpy.ops.seip.take_out_of_role(role="ROADS")
+        bpy.ops.seip.assign_role(role="ROADS", remove=True)
     bpy.ops.object.select_all(action="DESELECT")
     with pytest.raises(RuntimeError, match="Select objects first"):
         bpy.ops.seip.assign_role(role="ROADS")

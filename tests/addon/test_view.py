@@ -95,7 +95,7 @@ def test_a_placement_shows_its_coverage_with_legend_and_labels_and_so_does_the_f
     scene = bpy.context.scene
     assert overlays.legend_blocks(scene) == blocks
     assert overlays.labels_of(scene) == labels
-    bpy.ops.seip.toggle_legend()
+    scene.seip.view.legend = False
     bpy.ops.wm.save_as_mainfile(filepath=str(path))
     bpy.ops.wm.open_mainfile(filepath=str(path))
     assert handler_count() == 0
