@@ -1,4 +1,4 @@
-"""Operators that solve a placement and edit its constraints."""
+"""Operators that compute visibility, solve a placement, compare it with its scene, and edit its constraints."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ import bpy
 from .. import preferences, scene_status, scene_survey, selection
 from ..core.acceptance import Acceptance
 from ..core.choosing.placement.objective import Objective, check_objective
+from ..core.counts import counted
 from ..core.errors import SeipError
 from ..core.output.results.answer import answer
 from ..core.output.results.placement_record import Provenance
@@ -25,15 +26,52 @@ from ..core.workflows.detection import DetectionJob
 from ..core.workflows.finalists import check_judged, find_finalists, judge_elsewhere, judged_solution
 from ..core.workflows.placing import place, with_context
 from ..core.workflows.records import record_of
+from ..core.workflows.survey import Survey
 from ..core.workflows.traffic_runs import found_runs, read_runs
 from ..properties.conversion import output_folder, runs_folder
 from ..scene.blend_file import save_blend
 from ..scene.write import write_result
-from ..session import SceneState
+from ..session import SceneState, session
 from ..viewport import coverage
 from .base import Conditional, ForReadyScene, LongWork, Outcome, attempt, started
 from .detection import NO_PYTHON, folder_of_result
 from .results import keep_result
+
+
+class SEIP_OT_compute_visibility(ForReadyScene, LongWork[tuple[SceneState, Survey]], bpy.types.Operator):
+    """Compute which targets on the road are visible from each candidate pose"""
+
+    bl_idname = "seip.compute_visibility"
+    bl_label = "Compute Visibility"
+    bl_options = {"REGISTER"}  # nothing in the file changes
+
+    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, tuple[SceneState, Survey]]:
+        """Read the scene where it has changed."""
+        return scene_survey.with_visibility_of(scene_survey.survey(scene))
+
+    def conclude(self, scene: bpy.types.Scene, result: tuple[SceneState, Survey]) -> None:
+        """Hold the grid."""
+        state, survey = result
+        session.keep_state(scene, state)
+        site = survey.site
+        targets, poses = counted(len(site.targets), "target"), counted(len(site.candidates), "pose")
+        self.report({"INFO"}, f"visibility of {targets} from {poses} is known")
+
+
+class SEIP_OT_compare_scene(ForReadyScene, LongWork[SceneState], bpy.types.Operator):
+    """Check whether the placement still matches the scene"""
+
+    bl_idname = "seip.compare_scene"
+    bl_label = "Compare with Scene"
+    bl_options = {"REGISTER"}  # nothing in the file changes
+
+    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, SceneState]:
+        """Read the scene where it has changed."""
+        return scene_survey.survey(scene)
+
+    def conclude(self, scene: bpy.types.Scene, result: SceneState) -> None:
+        """Hold what was read: the panel compares."""
+        session.keep_state(scene, result)
 
 
 class _Placing(LongWork[SceneState]):
@@ -176,6 +214,8 @@ class SEIP_OT_add_rule(bpy.types.Operator):
 
 
 CLASSES = (
+    SEIP_OT_compute_visibility,
+    SEIP_OT_compare_scene,
     SEIP_OT_solve_placement,
     SEIP_OT_judge_placement,
     SEIP_OT_choose_number,

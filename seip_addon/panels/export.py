@@ -8,8 +8,7 @@ import bpy
 
 from ..operators import results
 from ..operators.view import SEIP_OT_save_picture
-from .run_button import draw_run
-from .sidebar import draw_path
+from .sidebar import draw_path, draw_run
 from .wrapped_text import draw_sentence
 
 

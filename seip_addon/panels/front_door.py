@@ -6,7 +6,7 @@ import bpy
 
 from ..operators.base import SEIP_OT_stop
 from ..operators.detection import SEIP_OT_detect
-from ..operators.placement import SEIP_OT_solve_placement
+from ..operators.placement import SEIP_OT_compute_visibility, SEIP_OT_solve_placement
 from ..operators.results import SEIP_OT_evaluate_sensors, SEIP_OT_export_result
 from ..operators.sensors import SEIP_OT_add_catalogue, SEIP_OT_preview_beams
 from ..operators.simulation import SEIP_OT_simulate_traffic
@@ -21,7 +21,6 @@ from ..operators.site import (
 )
 from ..operators.traffic import SEIP_OT_load_traffic, SEIP_OT_scan_frame, SEIP_OT_write_dataset
 from ..operators.view import SEIP_OT_colour_coverage, SEIP_OT_save_picture
-from ..operators.visibility import SEIP_OT_compute_visibility
 
 OPENDRIVE = "*.xodr"
 

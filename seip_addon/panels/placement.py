@@ -16,15 +16,18 @@ from ..core.output.results.answer import answer, sentence, status_text
 from ..core.output.results.placement_file import parsed_record
 from ..core.output.results.placement_record import PlacementRecord, relevant_warnings
 from ..core.workflows.traffic_runs import traffic_folder
-from ..operators.placement import SEIP_OT_choose_number, SEIP_OT_judge_placement, SEIP_OT_solve_placement
+from ..operators.placement import (
+    SEIP_OT_choose_number,
+    SEIP_OT_compare_scene,
+    SEIP_OT_judge_placement,
+    SEIP_OT_solve_placement,
+)
 from ..operators.results import SEIP_OT_evaluate_sensors, no_placement
 from ..operators.sensors import SEIP_MT_survey_presets, SEIP_OT_add_survey_preset
-from ..operators.visibility import SEIP_OT_compare_scene
 from ..scene.sensors import labelled_sensors
 from ..sensor_edits import sensor_edits
-from .run_button import draw_run
 from .sections import BETWEEN, Status, draw_sections
-from .sidebar import RowList, draw_path, is_narrow, settings_column
+from .sidebar import RowList, draw_path, draw_run, is_narrow, settings_column
 from .wrapped_text import BOX, draw_sentence, sidebar_width
 
 _SHOWN = {

@@ -1,4 +1,4 @@
-"""The step "Sensors": products to choose from, mounting heights and tilts."""
+"""The step "Sensors": the table of products, those to choose from, mounting heights and tilts."""
 
 from __future__ import annotations
 
@@ -9,18 +9,106 @@ import bpy
 from .. import sensor_types
 from ..core.output.results.placement_file import parsed_record
 from ..core.sensing.lidar.model import LidarModel
+from ..core.sensing.returns.bodies import PANELS
 from ..core.sensing.visibility.ring_resolution import unresolved_from
-from ..core.sensing.visibility.road_range import road_range
+from ..core.sensing.visibility.road_range import road_range, upright_range
 from ..core.sensing.visibility.settings import VisibilitySettings
+from ..operators.base import Outcome
 from ..operators.results import no_placement
-from ..operators.sensors import SEIP_OT_preview_beams
+from ..operators.sensors import SEIP_OT_add_catalogue, SEIP_OT_preview_beams
 from ..scene.materials import REFLECTIVITY
 from ..session import session
 from ..viewport import beam_preview
 from .sections import Status, draw_sections
-from .sensor_table import SEIP_OT_choose_sensors, pedestrian_range
 from .sidebar import is_narrow, settings_column
 from .wrapped_text import draw_sentence
+
+TABLE_WIDTH = 760
+"""Width of the table, pixels at the usual scale of the interface."""
+COLUMNS = (("Sensor", 0.40), ("Channels", 0.11), ("Field of view", 0.14), ("Pedestrian", 0.12), ("Price", 0.11))
+"""Titles and shares of the width; the rest shows what the detection law rests on."""
+
+
+class SEIP_OT_choose_sensors(bpy.types.Operator):
+    """Choose the sensors that a placement may use, from a table of all products"""
+
+    bl_idname = "seip.choose_sensors"
+    bl_label = "Choose Sensors…"
+    bl_options = {"REGISTER", "UNDO"}
+
+    def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> Outcome:
+        """Show the table."""
+        sensor_types.refresh()
+        context.scene.seip.survey.filter = ""
+        outcome: Outcome = context.window_manager.invoke_popup(self, width=TABLE_WIDTH)
+        return outcome
+
+    def execute(self, _context: bpy.types.Context) -> Outcome:
+        """Keep the choice, which the table has made."""
+        return {"FINISHED"}
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Draw the filter, and a row for each product."""
+        survey, layout = context.scene.seip.survey, self.layout
+        layout.prop(survey, "filter", text="", icon="VIEWZOOM", placeholder="Manufacturer or product")
+        draw_table(layout, survey)
+        layout.operator(SEIP_OT_add_catalogue.bl_idname, icon="ADD")
+
+
+def draw_table(layout: bpy.types.UILayout, survey: bpy.types.PropertyGroup) -> None:
+    """Draw the titles, and a row for each product whose name contains the filter."""
+    wanted = survey.filter.casefold()
+    shown = [key for key in sensor_types.in_order() if wanted in f"{key} {_title_of(key)}".casefold()]
+    _row(layout, None, (*(title for title, _ in COLUMNS), "Detection law"))
+    column = layout.column(align=True)
+    column.scale_y = 0.85
+    for key in shown:
+        _row(column, survey.types.get(key), _cells(session.sensor_types[key]))
+    if not shown:
+        column.label(text="No product has this in its name.", icon="INFO")
+
+
+def _row(layout: bpy.types.UILayout, item: bpy.types.PropertyGroup | None, cells: tuple[str, ...]) -> None:
+    rest, left = layout.row(align=True), 1.0
+    for number, text in enumerate(cells):
+        if number < len(COLUMNS):
+            share = COLUMNS[number][1]
+            rest = rest.split(factor=share / left)
+            left -= share
+        if number == 0 and item is not None:
+            rest.prop(item, "use", text=text, translate=False)
+        else:
+            rest.label(text=text, translate=False)
+
+
+def _title_of(key: str) -> str:
+    return sensor_types.title(session.sensor_types[key])
+
+
+def _cells(model: LidarModel) -> tuple[str, ...]:
+    low, high = math.degrees(model.elevations.min()), math.degrees(model.elevations.max())
+    across = math.degrees(model.field_of_view)
+    return (
+        sensor_types.title(model),
+        "rosette" if model.rosette is not None else f"{model.channels}",
+        f"{across:.0f}° × {high - low:.0f}°",
+        f"{pedestrian_range(model):.0f} m",
+        f"${model.price:,.0f}",
+        _law(model),
+    )
+
+
+def _law(model: LidarModel) -> str:
+    if model.manufacturer == sensor_types.PAPER:
+        return "paper's model"
+    if model.calibration:
+        return "calibrated"
+    return "data sheet"
+
+
+def pedestrian_range(model: LidarModel) -> float:
+    """Return the distance in metres up to which a return from a pedestrian is detected with the usual probability."""
+    return upright_range(model, PANELS["pedestrian"].reflected, VisibilitySettings())
 
 
 def status(scene: bpy.types.Scene) -> Status:
@@ -171,3 +259,6 @@ def _draw_beams(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     draw_sentence(layout, "Orange: more; road between may go unseen", icon="COLORSET_02_VEC")
     before = " in front" if preview.tilt else ""
     draw_sentence(layout, f"A level road{before} has no gaps up to {preview.resolved_to():.0f} m.")
+
+
+CLASSES = (SEIP_OT_choose_sensors,)

@@ -24,9 +24,8 @@ from ..operators.site import (
 from ..properties.site import SEIP_PG_site
 from ..scene import roles
 from . import sumo
-from .run_button import draw_run
 from .sections import Status, draw_sections
-from .sidebar import draw_path, is_narrow, settings_column
+from .sidebar import draw_path, draw_run, is_narrow, settings_column
 from .wrapped_text import ICON, MARGIN, draw_lines, draw_sentence, wrapped
 
 TARGETS = "Targets"

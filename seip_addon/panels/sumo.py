@@ -6,8 +6,8 @@ import bpy
 
 from .. import preferences
 from ..core.sumo_installation import sumo_size
-from ..operators.sumo import SEIP_OT_install_sumo
-from .run_button import draw_run
+from ..operators.simulation import SEIP_OT_install_sumo
+from .sidebar import draw_run
 from .wrapped_text import draw_sentence
 
 

@@ -69,7 +69,7 @@ def test_a_file_of_a_command_opens_with_its_sensors_which_are_evaluated_there(
     assert scene_status.current_step(scene) == "placement"
     assert sensors.status(scene).result[0] == "Type 1 (16 channels)"
     bpy.context.window_manager.seip_sections.view = True
-    monkeypatch.setattr(results.view.coverage, "shows_coverage", lambda _: True)  # there is no 3D view
+    monkeypatch.setattr(results.coverage, "shows_coverage", lambda _: True)  # there is no 3D view
     layout = DrawnLayout()
     results.draw(layout, bpy.context)
     assert "seip.colour_coverage" in dict(layout.operators)

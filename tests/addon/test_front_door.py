@@ -13,7 +13,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from seip_addon import loose_pieces, scene_status
 from seip_addon.operators.base import LongWork
-from seip_addon.panels import detection, export, front_door, results, sections, view, wrapped_text
+from seip_addon.panels import export, front_door, results, sections, traffic, wrapped_text
 from seip_addon.scene import contract
 from seip_addon.scene.read import read_scene
 from seip_addon.scene.sensors import placed_sensors
@@ -137,11 +137,17 @@ def test_the_post_of_a_deleted_sensor_goes_with_it(scene, copied):
 
 
 def test_a_section_has_one_sentence_where_there_is_nothing_yet(scene, monkeypatch):
-    for part in (results, export, view, detection):
+    parts = (
+        (results, results.draw),
+        (export, export.draw),
+        (results, results.draw_view),
+        (traffic, traffic.draw_detection),
+    )
+    for part, draw in parts:
         said = []
         monkeypatch.setattr(part, "draw_sentence", lambda _, text, said=said, **__: said.append(text))
         layout = DrawnLayout()
-        part.draw(layout, bpy.context)
+        draw(layout, bpy.context)
         assert len(said) == 1
         assert not layout.operators
 
@@ -191,7 +197,7 @@ def test_all_sections_open_without_and_with_a_placement(junction, monkeypatch):
     for name in [one.identifier for one in bpy.context.window_manager.seip_sections.bl_rna.properties]:
         if not name.endswith("_state") and name not in {"rna_type", "name"}:
             setattr(bpy.context.window_manager.seip_sections, name, True)
-    monkeypatch.setattr(view.coverage, "shows_coverage", lambda _: True)  # there is no 3D view
+    monkeypatch.setattr(results.coverage, "shows_coverage", lambda _: True)  # there is no 3D view
     panel = SimpleNamespace(layout=DrawnLayout())
     bpy.types.SEIP_PT_steps.draw(panel, bpy.context)
     bpy.ops.seip.solve_placement()

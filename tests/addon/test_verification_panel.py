@@ -15,7 +15,7 @@ from seip_addon.core.site.scene_geometry import Mesh
 from seip_addon.core.workflows.verifying import verify
 from seip_addon.operators import verification as operators
 from seip_addon.operators.verification import SEIP_OT_verify
-from seip_addon.panels import verification as panel
+from seip_addon.panels import traffic as panel
 from seip_addon.scene import contract
 from seip_addon.scene.read import read_scene
 from seip_addon.scene.sensors import read_sensors
@@ -91,7 +91,7 @@ def verified(placed, computed, monkeypatch):
 
 def drawn():
     layout = DrawnLayout()
-    panel.draw(layout, bpy.context)
+    panel.draw_verification(layout, bpy.context)
     return layout
 
 

@@ -17,7 +17,7 @@ from seip_addon.core.progress import Progress
 from seip_addon.operators import base, results
 from seip_addon.panels import missing_package
 from seip_addon.panels import placement as placement_panel
-from seip_addon.panels.run_button import draw_run
+from seip_addon.panels.sidebar import draw_run
 from seip_addon.session import RunningWork, session
 from tests.builders.drawn_layout import DrawnLayout
 
