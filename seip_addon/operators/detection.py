@@ -30,7 +30,12 @@ def why_no_detection(scene: bpy.types.Scene) -> str:
     """Return why nothing can be detected; nothing where it can."""
     if not labelled_sensors(scene):
         return NO_SENSORS
-    return scene_status.obstacle(scene) or ("" if preferences.detecting_python() is not None else NO_PYTHON)
+    return scene_status.obstacle(scene) or no_python(scene)
+
+
+def no_python(_scene: bpy.types.Scene) -> str:
+    """Return that there is no Python for detection, or ""."""
+    return "" if preferences.detecting_python() is not None else NO_PYTHON
 
 
 def sensors_key(scene: bpy.types.Scene) -> str:
@@ -49,10 +54,7 @@ class SEIP_OT_detect(Conditional, LongWork[str], bpy.types.Operator):
     bl_label = "Detect"
     stopped_message = "stopped; nothing was written"
 
-    @classmethod
-    def why_not(cls, context: bpy.types.Context) -> str:
-        """Return a reason if sensors or a Python with PyTorch are missing."""
-        return why_no_detection(context.scene)
+    obstacles = (why_no_detection,)
 
     def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, str]:
         """Save the scene as it is, for the process that detects."""

@@ -8,7 +8,6 @@ from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Literal
 
 import bpy
 
@@ -33,8 +32,8 @@ from ..scene.blend_file import save_blend
 from ..scene.write import write_result
 from ..session import SceneState, session
 from ..viewport import coverage
-from .base import Conditional, ForReadyScene, LongWork, Outcome, attempt, started
-from .detection import NO_PYTHON, folder_of_result
+from .base import Conditional, ForReadyScene, LongWork, Outcome, ShortWork, started
+from .detection import NO_PYTHON, folder_of_result, no_python
 from .results import keep_result
 
 
@@ -109,10 +108,7 @@ class SEIP_OT_judge_placement(Conditional, _Placing, bpy.types.Operator):
     bl_idname = "seip.judge_placement"
     bl_label = "Judge by Detection"
 
-    @classmethod
-    def why_not(cls, context: bpy.types.Context) -> str:
-        """Return a reason if an input of a placement, or a Python with PyTorch, is missing."""
-        return scene_status.obstacle(context.scene) or ("" if preferences.detecting_python() is not None else NO_PYTHON)
+    obstacles = (scene_status.obstacle, no_python)
 
     def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, SceneState]:
         """Read the scene where it has changed, save it for the process that judges, and state the objective."""
@@ -185,7 +181,7 @@ class SEIP_OT_choose_number(bpy.types.Operator):
         return {"FINISHED"}
 
 
-class SEIP_OT_add_rule(bpy.types.Operator):
+class SEIP_OT_add_rule(ShortWork, bpy.types.Operator):
     """Require or forbid a sensor at the position of the selected pole or sensor, or at the named one"""
 
     bl_idname = "seip.add_rule"
@@ -198,11 +194,9 @@ class SEIP_OT_add_rule(bpy.types.Operator):
         items=(("MANDATORY", "Sensor", "There must be a sensor"), ("FORBIDDEN", "No sensor", "There must be none")),
     )
 
-    def execute(self, context: bpy.types.Context) -> Outcome:
+    def act(self, context: bpy.types.Context) -> None:
         """Add it, or change the one that is there."""
-        return attempt(self, lambda: self._add(context, self.rule))
-
-    def _add(self, context: bpy.types.Context, rule: Literal["MANDATORY", "FORBIDDEN"]) -> None:
+        rule = self.rule
         goal = context.scene.seip.goal
         name = goal.position or selection.position_of(context.scene, context.object)
         if not name:

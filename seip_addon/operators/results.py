@@ -44,7 +44,7 @@ from ..scene.sensors import labelled_sensors, placed_sensors, read_sensors
 from ..scene.write import coverage_of, shown_legend, take_over
 from ..sensor_edits import position_names, sensor_edits
 from ..session import SceneState, session
-from .base import ForReadyScene, LongWork, Outcome, Result, attempt, started
+from .base import ForReadyScene, LongWork, Obstacles, Outcome, Result, ShortWork, started
 
 OTHER_TARGETS = "The two placements were made on different targets: only their figures can be compared."
 PLAN, REPORT = "plan.png", REPORT_FILES[0]
@@ -54,15 +54,6 @@ EYE_DISTANCE = 10.0
 
 
 _Following = tuple[SceneState, VisibilityModel, SensorReturns | None]  # what following sensors needs
-
-
-class ForPlacement(ForReadyScene):
-    """Mixin that enables an operator only where the scene has a placement."""
-
-    @classmethod
-    def why_not(cls, context: bpy.types.Context) -> str:
-        """Return a reason if an input of a placement is missing, or there is no placement."""
-        return super().why_not(context) or no_placement(context.scene)
 
 
 def no_placement(scene: bpy.types.Scene) -> str:
@@ -79,6 +70,12 @@ def no_placement(scene: bpy.types.Scene) -> str:
     return ""
 
 
+class ForPlacement(ForReadyScene):
+    """Mixin that enables an operator only where the scene has a placement."""
+
+    obstacles: Obstacles = (*ForReadyScene.obstacles, no_placement)
+
+
 def no_folder(scene: bpy.types.Scene) -> str:
     """Say why there is no folder yet to write the result to, and the cure; empty if there is one."""
     folder = scene.seip.result.folder
@@ -89,17 +86,20 @@ def no_folder(scene: bpy.types.Scene) -> str:
     return f"Save the file, or choose another folder: {folder[2:] or 'this one'} is beside the file."
 
 
-class SEIP_OT_look_from_sensor(ForPlacement, bpy.types.Operator):
+def not_evaluated(scene: bpy.types.Scene) -> str:
+    """Say what was done by hand to the sensors since they were placed or evaluated; empty if nothing was."""
+    sentence = sensor_edits(scene).describe()
+    return f"{sentence} Press Evaluate Sensors, or undo." if sentence else ""
+
+
+class SEIP_OT_look_from_sensor(ForPlacement, ShortWork, bpy.types.Operator):
     """Look from the sensor that is active in the list towards the road"""
 
     bl_idname = "seip.look_from_sensor"
     bl_label = "View from Sensor"
 
-    def execute(self, context: bpy.types.Context) -> Outcome:
+    def act(self, context: bpy.types.Context) -> None:
         """Set the view."""
-        return attempt(self, lambda: self._look(context))
-
-    def _look(self, context: bpy.types.Context) -> None:
         result = context.scene.seip.result
         label = result.sensors[result.active_sensor].name if result.sensors else ""
         empty = placed_sensors(context.scene).get(label)
@@ -132,10 +132,7 @@ class SEIP_OT_keep_placement(ForPlacement, bpy.types.Operator):
 
     name: bpy.props.StringProperty(name="Name", description="Name of the kept placement; numbered if empty")
 
-    @classmethod
-    def why_not(cls, context: bpy.types.Context) -> str:
-        """Return a reason if there is no placement, or sensors were moved since."""
-        return super().why_not(context) or not_evaluated(context.scene)
+    obstacles = (*ForPlacement.obstacles, not_evaluated)
 
     def execute(self, context: bpy.types.Context) -> Outcome:
         """Keep it, in place of another of that name."""
@@ -186,7 +183,7 @@ class SEIP_OT_remove_entry(bpy.types.Operator):
         return {"FINISHED"}
 
 
-class SEIP_OT_show_comparison(ForPlacement, bpy.types.Operator):
+class SEIP_OT_show_comparison(ForPlacement, ShortWork, bpy.types.Operator):
     """Colour the road by the placements that see it: both, only the kept one, only the present one or neither"""
 
     bl_idname = "seip.show_comparison"
@@ -197,11 +194,9 @@ class SEIP_OT_show_comparison(ForPlacement, bpy.types.Operator):
         name="Back", description="Show the coverage of the present placement again", default=False
     )
 
-    def execute(self, context: bpy.types.Context) -> Outcome:
+    def act(self, context: bpy.types.Context) -> None:
         """Colour the road."""
-        return attempt(self, lambda: self._show(context.scene))
-
-    def _show(self, scene: bpy.types.Scene) -> None:
+        scene = context.scene
         seip = scene.seip
         present = unpacked_counts(seip.result.seen)
         if self.back:
@@ -257,17 +252,20 @@ def _set_up(finding: Generator[Progress, None, SceneState]) -> Generator[Progres
     return state, visibility, SensorReturns(state.layout, solution.objective) if of_returns else None
 
 
+def _nothing_to_evaluate(scene: bpy.types.Scene) -> str:
+    return "" if scene_status.has_unevaluated(scene) else no_placement(scene)
+
+
 class SEIP_OT_evaluate_sensors(ForReadyScene, LongWork[SceneState], bpy.types.Operator):
     """Evaluate the sensors of the scene at their present poses, and make them the placement"""
 
     bl_idname = "seip.evaluate_sensors"
     bl_label = "Evaluate Sensors"
 
-    @classmethod
-    def why_not(cls, context: bpy.types.Context) -> str:
-        """Return a reason if an input is missing, or there is neither a placement nor a sensor."""
-        missing = no_placement(context.scene)
-        return super().why_not(context) or ("" if missing == scene_status.UNEVALUATED else missing)
+    obstacles = (
+        *ForReadyScene.obstacles,
+        lambda scene: "" if scene_status.has_unevaluated(scene) else no_placement(scene),
+    )
 
     def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, SceneState]:
         """Read the poses of the sensors; those without a placement are evaluated under the goal of the panel."""
@@ -316,19 +314,10 @@ def keep_result(scene: bpy.types.Scene, state: SceneState, record: PlacementReco
     session.keep_state(scene, replace(state, record=kept.record))
 
 
-def not_evaluated(scene: bpy.types.Scene) -> str:
-    """Say what was done by hand to the sensors since they were placed or evaluated; empty if nothing was."""
-    sentence = sensor_edits(scene).describe()
-    return f"{sentence} Press {SEIP_OT_evaluate_sensors.bl_label}, or undo." if sentence else ""
-
-
 class _Writes(ForPlacement, LongWork[Result]):
     """Mixin for operators that write the placement into the folder of the result."""
 
-    @classmethod
-    def why_not(cls, context: bpy.types.Context) -> str:
-        """Return a reason if there is no placement or no folder, or sensors were moved since."""
-        return super().why_not(context) or no_folder(context.scene) or not_evaluated(context.scene)
+    obstacles = (*ForPlacement.obstacles, no_folder, not_evaluated)
 
 
 def _checked_folder(scene: bpy.types.Scene) -> Path:

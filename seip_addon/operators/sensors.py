@@ -13,23 +13,19 @@ from ..core.errors import SeipError
 from ..core.sensing.lidar.catalogue import load_catalogue
 from ..session import session
 from ..viewport import beam_preview
-from .base import Conditional, Outcome, attempt
+from .base import Conditional, Outcome, ShortWork
 
 
-class _EditsCatalogues(Conditional):
-    """A mixin for operators on the list of catalogues, which preferences keep."""
-
-    @classmethod
-    def why_not(cls, _context: bpy.types.Context) -> str:
-        """Return a reason if the add-on has no preferences."""
-        return "Install the add-on as an extension: only then it has preferences" if preferences.own() is None else ""
+def _no_preferences(_scene: bpy.types.Scene) -> str:
+    return "Install the add-on as an extension: only then it has preferences" if preferences.own() is None else ""
 
 
-class SEIP_OT_add_catalogue(_EditsCatalogues, bpy.types.Operator):
+class SEIP_OT_add_catalogue(Conditional, ShortWork, bpy.types.Operator):
     """Add a catalogue of your own, which docs/sensors.md describes"""
 
     bl_idname = "seip.add_catalogue"
     bl_label = "Add Catalogue"
+    obstacles = (_no_preferences,)
 
     filepath: bpy.props.StringProperty(
         name="File", description="The catalogue", subtype="FILE_PATH", options={"PATH_SUPPORTS_BLEND_RELATIVE"}
@@ -41,11 +37,8 @@ class SEIP_OT_add_catalogue(_EditsCatalogues, bpy.types.Operator):
         context.window_manager.fileselect_add(self)
         return {"RUNNING_MODAL"}
 
-    def execute(self, _context: bpy.types.Context) -> Outcome:
+    def act(self, _context: bpy.types.Context) -> None:
         """Read it, and keep its name."""
-        return attempt(self, self._add)
-
-    def _add(self) -> None:
         path = Path(bpy.path.abspath(self.filepath))
         shipped = load_catalogue()
         models = load_catalogue([path])
@@ -57,44 +50,36 @@ class SEIP_OT_add_catalogue(_EditsCatalogues, bpy.types.Operator):
         self.report({"INFO"}, f"{path.name}: {changed} sensor types added or replaced")
 
 
-class SEIP_OT_remove_catalogue(_EditsCatalogues, bpy.types.Operator):
+class SEIP_OT_remove_catalogue(Conditional, ShortWork, bpy.types.Operator):
     """Remove a catalogue of your own from the list; the file stays"""
 
     bl_idname = "seip.remove_catalogue"
     bl_label = "Remove Catalogue"
+    obstacles = (_no_preferences,)
 
     index: bpy.props.IntProperty(name="Number", description="Index of the catalogue, from 0", min=0)
 
-    def execute(self, _context: bpy.types.Context) -> Outcome:
+    def act(self, _context: bpy.types.Context) -> None:
         """Forget it."""
-        return attempt(self, self._remove)
-
-    def _remove(self) -> None:
         preferences.remove_catalogue(self.index)
         sensor_types.refresh()
 
 
-class SEIP_OT_empty_cache(Conditional, bpy.types.Operator):
+class SEIP_OT_empty_cache(Conditional, ShortWork, bpy.types.Operator):
     """Delete all stored visibility grids; they are computed again when needed"""
 
     bl_idname = "seip.empty_cache"
     bl_label = "Empty Cache"
 
-    @classmethod
-    def why_not(cls, _context: bpy.types.Context) -> str:
-        """Return a reason if there is nothing to delete, or running work needs it."""
-        return "Wait for the work under way" if session.running is not None else preferences.why_not_empty()
+    obstacles = (lambda _: "Wait for the work under way" if session.running else preferences.why_not_empty(),)
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Outcome:
         """Ask first."""
         outcome: Outcome = context.window_manager.invoke_confirm(self, event)
         return outcome
 
-    def execute(self, _context: bpy.types.Context) -> Outcome:
+    def act(self, _context: bpy.types.Context) -> None:
         """Delete it."""
-        return attempt(self, self._empty)
-
-    def _empty(self) -> None:
         count = preferences.empty_cache()
         self.report({"INFO"}, f"{counted(count, 'file')} deleted")
 

@@ -31,10 +31,7 @@ class SEIP_OT_install_sumo(Conditional, LongWork[Sumo], bpy.types.Operator):
     bl_options = {"REGISTER"}  # nothing in the file changes
     stopped_message = "stopped; SUMO was not installed"
 
-    @classmethod
-    def why_not(cls, _context: bpy.types.Context) -> str:
-        """Return a reason if Blender may not go online or has no pip."""
-        return preferences.why_no_installation()
+    obstacles = (lambda _: preferences.why_no_installation(),)
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event | None) -> Outcome:
         """Start in the main window: work ends with its window, and that of the preferences is soon closed."""
@@ -76,10 +73,7 @@ class SEIP_OT_simulate_traffic(Conditional, LongWork[SimulatedRuns], bpy.types.O
     bl_label = "Simulate Traffic"
     stopped_message = "stopped; no run was written"
 
-    @classmethod
-    def why_not(cls, context: bpy.types.Context) -> str:
-        """Return a reason if the road, a map of it or SUMO is missing."""
-        return why_no_simulation(context.scene)
+    obstacles = (why_no_simulation,)
 
     def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, SimulatedRuns]:
         """Read the road and the map."""

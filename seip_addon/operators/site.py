@@ -35,7 +35,7 @@ from ..scene.startup import remove_startup_objects
 from ..scene.views import frame_site
 from ..session import CheckedScene, session
 from ..viewport import overlays
-from .base import Conditional, LongWork, Outcome, attempt
+from .base import Conditional, LongWork, Obstacles, Outcome, ShortWork
 
 EXAMPLE = Path(__file__).resolve().parents[2] / "scenes" / f"junction{DESCRIPTION_SUFFIX}"
 """The site that comes with SEIP: beside the package, in a checkout as in the extension."""
@@ -53,10 +53,7 @@ AREA_ITEMS = tuple(item for item in ROLE_ITEMS if Role[item[0]] in roles.AREAS)
 class _WritesScene(Conditional):
     """A mixin for operators that write into the scene, which must belong to the open file."""
 
-    @classmethod
-    def why_not(cls, context: bpy.types.Context) -> str:
-        """Return a reason if the scene is linked from another file."""
-        return scene_status.not_own(context.scene)
+    obstacles: Obstacles = (scene_status.not_own,)
 
 
 class SEIP_OT_choose_map(_WritesScene, LongWork[SitePlaces], bpy.types.Operator):
@@ -133,11 +130,11 @@ class SEIP_OT_download_map(_WritesScene, LongWork[tuple[Path, SitePlaces]], bpy.
     bl_label = "Download Map"
     stopped_message = "stopped; nothing was downloaded"
 
-    @classmethod
-    def why_not(cls, context: bpy.types.Context) -> str:
-        """Return a reason if there is no place, or Blender may not go online."""
-        place = "" if context.scene.seip.site.new_site else NO_NEW_SITE
-        return super().why_not(context) or place or preferences.why_no_download()
+    obstacles = (
+        *_WritesScene.obstacles,
+        lambda scene: "" if scene.seip.site.new_site else NO_NEW_SITE,
+        lambda _: preferences.why_no_download(),
+    )
 
     def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, tuple[Path, SitePlaces]]:
         """Take the position, for a site of the usual size: a larger one downloads more when it is built."""
@@ -157,6 +154,22 @@ def _downloaded(request: SiteRequest) -> Generator[Progress, None, tuple[Path, S
     """Download an extract, and list its junctions."""
     path = yield from site_source(request)
     return path, (yield from site_places(path))
+
+
+def missing_for_build(scene: bpy.types.Scene) -> str:
+    """Say what is missing before a site can be built, or nothing."""
+    site = scene.seip.site
+    if not site.source:
+        return "Choose a map first"
+    if site.is_extract() and preferences.sumo() is None:
+        return preferences.NO_SUMO
+    if not site.has_place():
+        return NO_PLACE
+    try:
+        site.request()
+    except SeipError as error:
+        return str(error)
+    return ""
 
 
 class _BuildsSite(_WritesScene, LongWork[BuiltSite]):
@@ -205,10 +218,7 @@ class SEIP_OT_build_site(_BuildsSite, bpy.types.Operator):
     bl_idname = "seip.build_site"
     bl_label = "Build Site"
 
-    @classmethod
-    def why_not(cls, context: bpy.types.Context) -> str:
-        """Return a reason if no place is chosen or the scene is linked from another file."""
-        return missing_for_build(context.scene) or super().why_not(context)
+    obstacles = (missing_for_build, *_WritesScene.obstacles)
 
     def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, BuiltSite]:
         """Take what was chosen."""
@@ -264,22 +274,6 @@ def _bring_to_front(scene: bpy.types.Scene) -> None:
     overlays.open_sidebar(window)
 
 
-def missing_for_build(scene: bpy.types.Scene) -> str:
-    """Say what is missing before a site can be built, or nothing."""
-    site = scene.seip.site
-    if not site.source:
-        return "Choose a map first"
-    if site.is_extract() and preferences.sumo() is None:
-        return preferences.NO_SUMO
-    if not site.has_place():
-        return NO_PLACE
-    try:
-        site.request()
-    except SeipError as error:
-        return str(error)
-    return ""
-
-
 def is_of_choice(scene: bpy.types.Scene) -> bool:
     """Return whether the site of a scene is of the chosen place on the chosen map: a new one replaces it."""
     return has_site(scene) and scene.get(contract.BUILT) == scene.seip.site.place()
@@ -290,7 +284,7 @@ def has_site(scene: bpy.types.Scene) -> bool:
     return any(contract.base_name(collection) in contract.INPUTS for collection in scene.collection.children_recursive)
 
 
-class SEIP_OT_assign_role(_WritesScene, bpy.types.Operator):
+class SEIP_OT_assign_role(_WritesScene, ShortWork, bpy.types.Operator):
     """Link the selected objects to the collection of a role, or remove them from it; other collections stay"""
 
     bl_idname = "seip.assign_role"
@@ -305,11 +299,9 @@ class SEIP_OT_assign_role(_WritesScene, bpy.types.Operator):
         """Return a reason if nothing is selected or the scene is linked from another file."""
         return super().why_not(context) or ("" if context.selected_objects else "Select objects first")
 
-    def execute(self, context: bpy.types.Context) -> Outcome:
+    def act(self, context: bpy.types.Context) -> None:
         """Link or unlink them."""
-        return attempt(self, lambda: self._assign(context, Role[self.role]))
-
-    def _assign(self, context: bpy.types.Context, role: Role) -> None:
+        role = Role[self.role]
         change, what = (roles.take_out, "taken out of") if self.remove else (roles.assign, "assigned to")
         self.report({"INFO"}, f"{change(context.scene, context.selected_objects, role)} {what} the {role.value}")
 
@@ -435,7 +427,7 @@ def in_short(problems: Iterable[SEIP_PG_problem]) -> str:
     return f"{errors}, {warnings}" if any(kinds) else warnings
 
 
-class SEIP_OT_show_problem(bpy.types.Operator):
+class SEIP_OT_show_problem(ShortWork, bpy.types.Operator):
     """Select the object with the problem, and bring it into view"""
 
     bl_idname = "seip.show_problem"
@@ -444,11 +436,8 @@ class SEIP_OT_show_problem(bpy.types.Operator):
 
     number: bpy.props.IntProperty(name="Number", description="Number of the problem in the list, from 0", min=0)
 
-    def execute(self, context: bpy.types.Context) -> Outcome:
+    def act(self, context: bpy.types.Context) -> None:
         """Select it alone, and frame it."""
-        return attempt(self, lambda: self._show(context))
-
-    def _show(self, context: bpy.types.Context) -> None:
         obstacle = nothing_to_show(context, self.number)
         if obstacle:
             raise SeipError(obstacle)

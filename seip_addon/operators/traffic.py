@@ -23,7 +23,7 @@ from ..scene.read import read_scene
 from ..scene.sensors import read_sensors
 from ..scene.traffic import animate, clear_traffic, read_traffic
 from ..session import LastScan, SceneTraffic, session
-from .base import Conditional, LongWork, Outcome, Result
+from .base import Conditional, LongWork, Outcome
 
 NO_FILE = "There is no traffic file: name one, or animate objects of your own in SEIP Traffic."
 NO_TRAFFIC = "There is nothing to scan: name a traffic file, or animate objects in SEIP Traffic."
@@ -44,25 +44,13 @@ def why_no_scan(scene: bpy.types.Scene) -> str:
     return "" if there else NO_TRAFFIC
 
 
-class _Scanning(Conditional, LongWork[Result]):
-    """A mixin: a button that works where there are sensors and traffic."""
-
-    @classmethod
-    def why_not(cls, context: bpy.types.Context) -> str:
-        """Return a reason if there is no traffic to scan or no sensor to scan with."""
-        return why_no_scan(context.scene)
-
-
 class SEIP_OT_load_traffic(Conditional, LongWork[LoadedTraffic], bpy.types.Operator):
     """Read the traffic file and animate its road users on the road"""
 
     bl_idname = "seip.load_traffic"
     bl_label = "Load Traffic"
 
-    @classmethod
-    def why_not(cls, context: bpy.types.Context) -> str:
-        """Return a reason if there is no file to read."""
-        return why_no_load(context.scene)
+    obstacles = (why_no_load,)
 
     def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, LoadedTraffic]:
         """Read the scene that the traffic is to stand on."""
@@ -93,10 +81,7 @@ class SEIP_OT_clear_traffic(Conditional, bpy.types.Operator):
     bl_label = "Clear Traffic"
     bl_options = {"REGISTER", "UNDO"}
 
-    @classmethod
-    def why_not(cls, context: bpy.types.Context) -> str:
-        """Return a reason if there is no traffic."""
-        return "there is no traffic in the scene" if contract.find(context.scene, contract.TRAFFIC) is None else ""
+    obstacles = (lambda scene: "" if contract.find(scene, contract.TRAFFIC) else "there is no traffic in the scene",)
 
     def execute(self, context: bpy.types.Context) -> Outcome:
         """Take it out."""
@@ -108,10 +93,11 @@ class SEIP_OT_clear_traffic(Conditional, bpy.types.Operator):
         return {"FINISHED"}
 
 
-class SEIP_OT_scan_frame(_Scanning[LastScan], bpy.types.Operator):
+class SEIP_OT_scan_frame(Conditional, LongWork[LastScan], bpy.types.Operator):
     """Show the point cloud of the placed sensors at the current frame"""
 
     bl_idname = "seip.scan_frame"
+    obstacles = (why_no_scan,)
     bl_label = "Scan This Frame"
     bl_options = {"REGISTER"}  # nothing in the file changes
 
@@ -139,10 +125,11 @@ def _scanned(read: _SceneRead, at: float, before: LastScan | None) -> Generator[
     return last_scan.measure(run, simulation, at)
 
 
-class SEIP_OT_write_dataset(_Scanning[tuple[Record, tuple[str, ...]]], bpy.types.Operator):
+class SEIP_OT_write_dataset(Conditional, LongWork[tuple[Record, tuple[str, ...]]], bpy.types.Operator):
     """Scan all frames and write them with the boxes of all road users, as datasets for training detectors"""
 
     bl_idname = "seip.write_dataset"
+    obstacles = (why_no_scan,)
     bl_label = "Write Dataset"
     bl_options = {"REGISTER"}  # as above
     stopped_message = "stopped; what is written stays, and the same run goes on from there"

@@ -36,7 +36,7 @@ from ..scene.corrections import correct_scene
 from ..scene.read import read_scene
 from ..scene.sensors import labelled_sensors, read_sensors
 from ..session import LastVerification, session
-from .base import Conditional, LongWork, Outcome, attempt
+from .base import Conditional, LongWork, ShortWork
 from .detection import folder_of_result
 from .results import no_folder
 
@@ -95,10 +95,7 @@ class SEIP_OT_verify(Conditional, LongWork[_Verified], bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO"}  # the scene keeps what was found, also when a correction is undone
     stopped_message = "stopped; nothing was written"
 
-    @classmethod
-    def why_not(cls, context: bpy.types.Context) -> str:
-        """Return a reason if sensors or a recording are missing."""
-        return why_no_verification(context.scene)
+    obstacles = (why_no_verification,)
 
     def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, _Verified]:
         """Read the scene and its sensors, and open the recording."""
@@ -153,23 +150,18 @@ def _verified(
         return _Verified(found, sentences, {path.name: path.read_bytes() for path in sorted(drawn.iterdir())})
 
 
-class SEIP_OT_correct_scene(Conditional, bpy.types.Operator):
+class SEIP_OT_correct_scene(Conditional, ShortWork, bpy.types.Operator):
     """Add new objects as boxes, remove those that are gone, and move the sensors to their installed poses"""
 
     bl_idname = "seip.correct_scene"
     bl_label = "Add to Scene"
     bl_options = {"REGISTER", "UNDO"}
 
-    @classmethod
-    def why_not(cls, context: bpy.types.Context) -> str:
-        """Return a reason if the scene was not verified or has changed since."""
-        return why_no_correction(context.scene)
+    obstacles = (why_no_correction,)
 
-    def execute(self, context: bpy.types.Context) -> Outcome:
+    def act(self, context: bpy.types.Context) -> None:
         """Correct the scene."""
-        return attempt(self, lambda: self._correct(context.scene))
-
-    def _correct(self, scene: bpy.types.Scene) -> None:
+        scene = context.scene
         last = session.verifications[scene.session_uid]
         live_coverage.stop()
         problems = correct_scene(scene, last.found)

@@ -53,10 +53,7 @@ class SEIP_OT_colour_coverage(Conditional, bpy.types.Operator):
         default="times",
     )
 
-    @classmethod
-    def why_not(cls, context: bpy.types.Context) -> str:
-        """Return a reason if there is no coverage to colour."""
-        return why_no_coverage(context.scene)
+    obstacles = (why_no_coverage,)
 
     def execute(self, context: bpy.types.Context) -> Outcome:
         """Colour it."""
@@ -137,10 +134,7 @@ class SEIP_OT_save_picture(ForPlacement, LongWork[SceneState], bpy.types.Operato
         self._area = context.area
         return super().invoke(context, event)
 
-    @classmethod
-    def why_not(cls, context: bpy.types.Context) -> str:
-        """Return a reason if there is no placement, or sensors were moved since."""
-        return super().why_not(context) or not_evaluated(context.scene)
+    obstacles = (*ForPlacement.obstacles, not_evaluated)
 
     def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, SceneState]:
         """Return the job that restores the placement."""

@@ -197,7 +197,7 @@ def _move_by_hand(window: Window) -> Steps:
     yield from window.click("seip.evaluate_sensors(")
     yield from window.until(lambda: session.running is None and _record() != before, 200)
     assert _places() == there
-    assert (yield from _says(window, "Moved by hand"))
+    assert (yield from _says(window, "Evaluated at the sensors' current poses"))
     assert not (yield from _says(window, "Proven"))
 
 
@@ -273,11 +273,14 @@ def _simulate(window: Window) -> Steps:
 
 
 def _import_map(window: Window) -> Steps:
-    """Import a map through its dialog, as a dropped file is, into a scene of its own."""
+    """Import a map, as a dropped file is, through its map and its dialog, into a scene of its own."""
     before = set(bpy.data.scenes)
     with bpy.context.temp_override(window=window.window, area=window.area, region=window.region("WINDOW")):
         bpy.ops.seip.choose_map("INVOKE_DEFAULT", filepath=str(SCENES / "corridor.xodr"))
     yield from window.until(lambda: session.running is None and "corridor" in _scene().seip.site.source, 60)
+    yield 1.0
+    yield from window.shot("12-map")
+    yield from window.press("RET")  # from the map to the list of names
     yield 1.0
     yield from window.shot("12-dialog")
     yield from window.press("RET")
