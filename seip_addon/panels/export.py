@@ -7,7 +7,6 @@ from pathlib import Path
 import bpy
 
 from ..operators import results
-from ..operators.view import SEIP_OT_save_picture
 from .sidebar import draw_path, draw_run
 from .wrapped_text import draw_sentence
 
@@ -24,12 +23,12 @@ def draw(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     sentence = results.no_folder(scene) or results.not_evaluated(scene)
     if sentence:
         draw_sentence(layout, sentence, icon="INFO")
-    draw_run(layout, results.SEIP_OT_write_report.bl_idname, icon="FILE_TEXT")
-    draw_run(layout, results.SEIP_OT_export_result.bl_idname, icon="EXPORT", text="Export Files")
+    draw_run(layout, "seip.write_report", icon="FILE_TEXT")
+    draw_run(layout, "seip.export_result", icon="EXPORT", text="Export Files")
     _draw_files(layout, results.exported_files(scene))
     column = layout.column(align=True)
     draw_path(column, scene.seip.view, "picture")
-    draw_run(column, SEIP_OT_save_picture.bl_idname, icon="IMAGE_DATA")
+    draw_run(column, "seip.save_picture", icon="IMAGE_DATA")
 
 
 def _draw_files(layout: bpy.types.UILayout, files: dict[str, Path]) -> None:

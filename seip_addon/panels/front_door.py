@@ -4,23 +4,9 @@ from __future__ import annotations
 
 import bpy
 
-from ..operators.base import SEIP_OT_stop
-from ..operators.detection import SEIP_OT_detect
-from ..operators.placement import SEIP_OT_compute_visibility, SEIP_OT_solve_placement
-from ..operators.results import SEIP_OT_evaluate_sensors, SEIP_OT_export_result
-from ..operators.sensors import SEIP_OT_add_catalogue, SEIP_OT_preview_beams
-from ..operators.simulation import SEIP_OT_simulate_traffic
 from ..operators.site import (
     EXTRACTS,
-    SEIP_OT_add_area,
-    SEIP_OT_build_site,
-    SEIP_OT_check_site,
-    SEIP_OT_choose_map,
-    SEIP_OT_download_map,
-    SEIP_OT_load_example,
 )
-from ..operators.traffic import SEIP_OT_load_traffic, SEIP_OT_scan_frame, SEIP_OT_write_dataset
-from ..operators.view import SEIP_OT_colour_coverage, SEIP_OT_save_picture
 
 OPENDRIVE = "*.xodr"
 
@@ -28,7 +14,7 @@ OPENDRIVE = "*.xodr"
 class _Dropped:
     """A mixin: a file that is dropped into a 3D view is imported."""
 
-    bl_import_operator = SEIP_OT_choose_map.bl_idname
+    bl_import_operator = "seip.choose_map"
 
     @classmethod
     def poll_drop(cls, context: bpy.types.Context) -> bool:
@@ -64,17 +50,17 @@ class SEIP_MT_main(bpy.types.Menu):
         layout.operator_context = "INVOKE_DEFAULT"
         for step in STEPS:
             for operator in step:
-                layout.operator(operator.bl_idname)
+                layout.operator(f"seip.{operator}")
             layout.separator()
 
 
-STEPS: tuple[tuple[type[bpy.types.Operator], ...], ...] = (
-    (SEIP_OT_load_example, SEIP_OT_download_map, SEIP_OT_choose_map, SEIP_OT_build_site, SEIP_OT_check_site),
-    (SEIP_OT_add_catalogue, SEIP_OT_preview_beams, SEIP_OT_compute_visibility, SEIP_OT_solve_placement),
-    (SEIP_OT_evaluate_sensors, SEIP_OT_export_result),
-    (SEIP_OT_colour_coverage, SEIP_OT_save_picture),
-    (SEIP_OT_load_traffic, SEIP_OT_simulate_traffic, SEIP_OT_scan_frame, SEIP_OT_write_dataset, SEIP_OT_detect),
-    (SEIP_OT_stop,),
+STEPS: tuple[tuple[str, ...], ...] = (
+    ("load_example", "download_map", "choose_map", "build_site", "check_site"),
+    ("add_catalogue", "preview_beams", "compute_visibility", "solve_placement"),
+    ("evaluate_sensors", "export_result"),
+    ("colour_coverage", "save_picture"),
+    ("load_traffic", "simulate_traffic", "scan_frame", "write_dataset", "detect"),
+    ("stop",),
 )
 """Operators of the menu, by step of the work."""
 
@@ -82,14 +68,14 @@ STEPS: tuple[tuple[type[bpy.types.Operator], ...], ...] = (
 def draw_import(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
     """Draw what File ▸ Import gets."""
     for text, pattern in (("OpenDRIVE (.xodr)", OPENDRIVE), ("OpenStreetMap (.osm)", EXTRACTS)):
-        menu.layout.operator(SEIP_OT_choose_map.bl_idname, text=text).filter_glob = pattern
+        menu.layout.operator("seip.choose_map", text=text).filter_glob = pattern
 
 
 def draw_add(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
     """Draw what the menu Add gets."""
     menu.layout.operator_context = "INVOKE_DEFAULT"
-    menu.layout.operator(SEIP_OT_load_example.bl_idname, text="SEIP Example")
-    menu.layout.operator_menu_enum(SEIP_OT_add_area.bl_idname, "role", text="SEIP Area")
+    menu.layout.operator("seip.load_example", text="SEIP Example")
+    menu.layout.operator_menu_enum("seip.add_area", "role", text="SEIP Area")
 
 
 def draw_object(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:

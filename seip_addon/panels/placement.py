@@ -16,14 +16,8 @@ from ..core.output.results.answer import answer, sentence, status_text
 from ..core.output.results.placement_file import parsed_record
 from ..core.output.results.placement_record import PlacementRecord, relevant_warnings
 from ..core.workflows.traffic_runs import traffic_folder
-from ..operators.placement import (
-    SEIP_OT_choose_number,
-    SEIP_OT_compare_scene,
-    SEIP_OT_judge_placement,
-    SEIP_OT_solve_placement,
-)
-from ..operators.results import SEIP_OT_evaluate_sensors, no_placement
-from ..operators.sensors import SEIP_MT_survey_presets, SEIP_OT_add_survey_preset
+from ..operators.results import no_placement
+from ..operators.sensors import SEIP_MT_survey_presets
 from ..scene.sensors import labelled_sensors
 from ..sensor_edits import sensor_edits
 from .sections import BETWEEN, Status, draw_sections
@@ -91,7 +85,7 @@ def draw(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     else:
         row.prop(goal, "limit", expand=True)  # an empty text would leave each segment without its name
     column.prop(goal, goal.limit.lower())
-    draw_run(layout, SEIP_OT_solve_placement.bl_idname, text=button_text(scene))
+    draw_run(layout, "seip.solve_placement", text=button_text(scene))
     obstacle = scene_status.obstacle(scene)
     if obstacle:
         draw_sentence(layout, obstacle, icon="ERROR")
@@ -99,8 +93,8 @@ def draw(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
         _draw_answer(layout, scene)
     elif scene_status.has_unevaluated(scene):
         draw_sentence(layout, scene_status.UNEVALUATED, icon="INFO")
-        draw_run(layout, SEIP_OT_evaluate_sensors.bl_idname)
-    draw_run(layout, SEIP_OT_judge_placement.bl_idname)
+        draw_run(layout, "seip.evaluate_sensors")
+    draw_run(layout, "seip.judge_placement")
     draw_sections(
         layout,
         {
@@ -167,8 +161,8 @@ def _draw_candidates(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None
     survey = scene.seip.survey
     row = layout.row(align=True)
     row.menu(SEIP_MT_survey_presets.__name__, text=SEIP_MT_survey_presets.bl_label)
-    row.operator(SEIP_OT_add_survey_preset.bl_idname, text="", icon="ADD")
-    row.operator(SEIP_OT_add_survey_preset.bl_idname, text="", icon="REMOVE").remove_active = True
+    row.operator("seip.add_survey_preset", text="", icon="ADD")
+    row.operator("seip.add_survey_preset", text="", icon="REMOVE").remove_active = True
     for heading, names in (
         ("Road", ("grid", "delta")),
         ("Positions", ("spacing", "allow")),
@@ -200,9 +194,9 @@ def _draw_answer(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
         draw_sentence(box, text, icon="ERROR", reserved=BOX)
     stale = scene_status.stale_placement(scene)
     if stale and stale != scene_status.ANOTHER_SITE:
-        draw_run(box, SEIP_OT_compare_scene.bl_idname)
+        draw_run(box, "seip.compare_scene")
     if sensor_edits(scene).describe():
-        draw_run(box, SEIP_OT_evaluate_sensors.bl_idname)
+        draw_run(box, "seip.evaluate_sensors")
     other_goal = "" if doubts else scene_status.other_goal(scene)
     if other_goal:
         draw_sentence(box, other_goal, icon="INFO", reserved=BOX)
@@ -227,7 +221,7 @@ def _draw_numbers(
     for count, share, text in numbers(record):
         row = column.split(factor=NUMBER_SHARE, align=True)
         button = row.operator(
-            SEIP_OT_choose_number.bl_idname,
+            "seip.choose_number",
             text=str(count),
             icon="CHECKMARK" if count == len(record.sensors) else "BLANK1",
             depress=goal.limit == "COUNT" and goal.count == count,

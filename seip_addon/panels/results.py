@@ -14,9 +14,6 @@ from ..core.sensing.lidar.model import short_name
 from ..operators import results
 from ..operators.results import no_placement
 from ..operators.view import (
-    SEIP_OT_colour_coverage,
-    SEIP_OT_hide_overlay,
-    SEIP_OT_show_sight_lines,
     why_no_coverage,
 )
 from ..scene.write import ASPECT, aspects_of, coverage_of
@@ -57,7 +54,7 @@ def _draw_coverage(layout: bpy.types.UILayout, context: bpy.types.Context) -> No
         if aspect not in possible:
             continue
         now = obj is not None and obj.get(ASPECT) == aspect
-        button = row.operator(SEIP_OT_colour_coverage.bl_idname, text=words, depress=now)
+        button = row.operator("seip.colour_coverage", text=words, depress=now)
         button.aspect = aspect
     if obj is not None and "returns" in possible and obj.get(ASPECT) in {"seen", "times"}:
         draw_sentence(column, SURFACE_SEEN, icon="INFO")
@@ -75,11 +72,11 @@ def _draw_sight(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     overlay = overlays.find(context.scene, SIGHT)
     row = column.row(align=True)
     words = "From Sensor" if overlay is None else overlay.about
-    row.operator_menu_enum(SEIP_OT_show_sight_lines.bl_idname, "sensor", text=words, icon="LIGHT_SPOT")
+    row.operator_menu_enum("seip.show_sight_lines", "sensor", text=words, icon="LIGHT_SPOT")
     if overlay is not None:
-        row.operator(SEIP_OT_hide_overlay.bl_idname, text="", icon="X").name = SIGHT
-    if is_running(SEIP_OT_show_sight_lines.bl_idname):
-        draw_run(column, SEIP_OT_show_sight_lines.bl_idname)
+        row.operator("seip.hide_overlay", text="", icon="X").name = SIGHT
+    if is_running("seip.show_sight_lines"):
+        draw_run(column, "seip.show_sight_lines")
     why_not = no_placement(context.scene)
     if why_not:
         draw_sentence(column, why_not, icon="INFO")
@@ -89,7 +86,7 @@ def _draw_cloud(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     column = layout.column(align=True)
     column.label(text="Point Cloud")
     column.row(align=True).prop(context.scene.seip.view, "cloud_colour", expand=True)
-    column.operator(SEIP_OT_hide_overlay.bl_idname, icon="X").name = CLOUD
+    column.operator("seip.hide_overlay", icon="X").name = CLOUD
 
 
 SENSOR_SHARE = 0.72
@@ -148,7 +145,7 @@ def draw(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     label = result.sensors[result.active_sensor].name if 0 <= result.active_sensor < len(result.sensors) else ""
     layout.operator("seip.look_from_sensor", icon="HIDE_OFF", text=f"View from {label or 'Sensor'}")
     if session.following is None:
-        draw_run(layout, results.SEIP_OT_follow_sensors.bl_idname, icon="ORIENTATION_GLOBAL")
+        draw_run(layout, "seip.follow_sensors", icon="ORIENTATION_GLOBAL")
     else:
         layout.operator("seip.follow_sensors", text="Stop Following", icon="PAUSE", depress=True)
         _draw_followed(layout, session.following)

@@ -15,7 +15,6 @@ from ..core.sensing.visibility.road_range import road_range, upright_range
 from ..core.sensing.visibility.settings import VisibilitySettings
 from ..operators.base import Outcome
 from ..operators.results import no_placement
-from ..operators.sensors import SEIP_OT_add_catalogue, SEIP_OT_preview_beams
 from ..scene.materials import REFLECTIVITY
 from ..session import session
 from ..viewport import beam_preview
@@ -52,7 +51,7 @@ class SEIP_OT_choose_sensors(bpy.types.Operator):
         survey, layout = context.scene.seip.survey, self.layout
         layout.prop(survey, "filter", text="", icon="VIEWZOOM", placeholder="Manufacturer or product")
         draw_table(layout, survey)
-        layout.operator(SEIP_OT_add_catalogue.bl_idname, icon="ADD")
+        layout.operator("seip.add_catalogue", icon="ADD")
 
 
 def draw_table(layout: bpy.types.UILayout, survey: bpy.types.PropertyGroup) -> None:
@@ -247,7 +246,7 @@ def _draw_beams(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     shown = beam_preview.is_shown()
     settings_column(layout).prop(context.scene.seip.survey, "preview_height")
     text = "Hide Beams" if shown else "Show Beams"
-    layout.operator(SEIP_OT_preview_beams.bl_idname, text=text, icon="LIGHT_SPOT", depress=shown)
+    layout.operator("seip.preview_beams", text=text, icon="LIGHT_SPOT", depress=shown)
     preview = beam_preview.preview_of(context) if shown else None
     if preview is None:
         return

@@ -8,14 +8,7 @@ from .. import preferences, scene_status
 from ..core.site.roles import Role
 from ..operators.base import Outcome
 from ..operators.site import (
-    SEIP_OT_add_area,
-    SEIP_OT_assign_role,
     SEIP_OT_build_site,
-    SEIP_OT_check_site,
-    SEIP_OT_choose_map,
-    SEIP_OT_download_map,
-    SEIP_OT_load_example,
-    SEIP_OT_show_problem,
     has_site,
     in_short,
     is_of_choice,
@@ -57,7 +50,7 @@ def draw(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
         ways = "Paste a place, choose a map, load the example, or give roles to your own objects."
         draw_sentence(layout, ways, icon="INFO")
         _draw_map(layout, scene)
-        draw_run(layout, SEIP_OT_load_example.bl_idname, icon="MOD_BUILD")
+        draw_run(layout, "seip.load_example", icon="MOD_BUILD")
     else:
         _draw_check(layout, scene)
         draw_sections(layout, {"contents": _draw_contents, "change_site": _draw_map}, scene)
@@ -68,11 +61,11 @@ def _draw_map(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
     site = scene.seip.site
     name = bpy.path.basename(site.source)
     _draw_download(layout, site)
-    draw_run(layout, SEIP_OT_choose_map.bl_idname, icon="FILE_FOLDER", text=name or "Choose Map…")
+    draw_run(layout, "seip.choose_map", icon="FILE_FOLDER", text=name or "Choose Map…")
     if not name:
         return
     if len(site.junctions) > 1:
-        layout.operator(SEIP_OT_choose_map.bl_idname, icon="VIEWZOOM", text="Pick on Map…").filepath = site.source
+        layout.operator("seip.choose_map", icon="VIEWZOOM", text="Pick on Map…").filepath = site.source
     if site.is_extract():
         sumo.draw_missing(layout)
     _draw_place(layout, site)
@@ -82,7 +75,7 @@ def _draw_map(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
         again = "The site is built again; your own objects and the sensors stay."
         elsewhere = "The site is built in a new scene; this one stays."
         draw_sentence(layout, again if is_of_choice(scene) else elsewhere, icon="INFO")
-    draw_run(layout, SEIP_OT_build_site.bl_idname)
+    draw_run(layout, "seip.build_site")
 
 
 def _draw_download(layout: bpy.types.UILayout, site: SEIP_PG_site) -> None:
@@ -94,7 +87,7 @@ def _draw_download(layout: bpy.types.UILayout, site: SEIP_PG_site) -> None:
         reason = preferences.why_no_download()
         if reason:
             draw_sentence(layout, f"{reason}.", icon="ERROR")
-        draw_run(layout, SEIP_OT_download_map.bl_idname, icon="WORLD")
+        draw_run(layout, "seip.download_map", icon="WORLD")
 
 
 class SEIP_OT_choose_place(bpy.types.Operator):
@@ -182,7 +175,7 @@ def _place_text(site: SEIP_PG_site) -> str:
 def _draw_check(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
     """Draw the button and one line, and the problems with a button each."""
     site = scene.seip.site
-    draw_run(layout, SEIP_OT_check_site.bl_idname)
+    draw_run(layout, "seip.check_site")
     if not site.checked:
         return
     doubt = scene_status.stale_check(scene)
@@ -199,7 +192,7 @@ def _draw_check(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
         draw_sentence(row.column(), problem.text, icon="CANCEL" if problem.is_error else "ERROR", reserved=SHOW_WIDTH)
         button = row.row()
         button.enabled = bool(problem.name)
-        button.operator(SEIP_OT_show_problem.bl_idname, text="", icon="ZOOM_SELECTED").number = number
+        button.operator("seip.show_problem", text="", icon="ZOOM_SELECTED").number = number
 
 
 def _draw_contents(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
@@ -215,13 +208,13 @@ def _draw_roles(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     site = context.scene.seip.site
     layout.prop(site, "role", text="")
     row = layout.row(align=True)
-    row.operator(SEIP_OT_assign_role.bl_idname, icon="ADD").role = site.role
-    button = row.operator(SEIP_OT_assign_role.bl_idname, text="Remove", icon="REMOVE")
+    row.operator("seip.assign_role", icon="ADD").role = site.role
+    button = row.operator("seip.assign_role", text="Remove", icon="REMOVE")
     button.role, button.remove = site.role, True
     if Role[site.role] in roles.AREAS:
         row = layout.column(align=True) if is_narrow(context) else layout.row(align=True)
         for place, text in (("CURSOR", "Draw at Cursor"), ("VIEW", "Draw in View")):
-            button = row.operator(SEIP_OT_add_area.bl_idname, text=text)
+            button = row.operator("seip.add_area", text=text)
             button.role, button.place = site.role, place
     if context.object is None:
         draw_sentence(layout, "Select objects to give them a role.", icon="INFO")

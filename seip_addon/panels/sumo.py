@@ -35,4 +35,4 @@ def draw_installation(layout: bpy.types.UILayout, *, in_one_row: bool = False) -
     if reason:
         draw_sentence(layout, f"{reason}.", icon="INFO")
     text = f"{SEIP_OT_install_sumo.bl_label} ({sumo_size().download} MB)"
-    draw_run(layout, SEIP_OT_install_sumo.bl_idname, icon="IMPORT", text=text, in_one_row=in_one_row)
+    draw_run(layout, "seip.install_sumo", icon="IMPORT", text=text, in_one_row=in_one_row)

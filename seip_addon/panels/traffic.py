@@ -11,20 +11,14 @@ from ..core.errors import SeipError
 from ..core.output.results.detection_record import MAIN_RULE, DetectionRecord, parsed_detection
 from ..core.workflows.detection import ERRORS
 from ..core.workflows.traffic_runs import traffic_folder
-from ..operators.detection import NO_PYTHON, SEIP_OT_detect, sensors_key, why_no_detection
-from ..operators.simulation import SEIP_OT_simulate_traffic, why_no_simulation
+from ..operators.detection import NO_PYTHON, sensors_key, why_no_detection
+from ..operators.simulation import why_no_simulation
 from ..operators.traffic import (
-    SEIP_OT_clear_traffic,
-    SEIP_OT_load_traffic,
-    SEIP_OT_scan_frame,
-    SEIP_OT_write_dataset,
     why_no_load,
     why_no_scan,
 )
 from ..operators.verification import (
     NO_RECORDING,
-    SEIP_OT_correct_scene,
-    SEIP_OT_verify,
     picture_of,
     sentences_of,
     why_no_correction,
@@ -61,7 +55,7 @@ def draw_simulation(layout: bpy.types.UILayout, context: bpy.types.Context) -> N
     reason = why_no_simulation(scene)
     if reason and preferences.sumo() is not None:  # else the sentence is there already
         draw_sentence(layout, reason, icon="INFO")
-    draw_run(layout, SEIP_OT_simulate_traffic.bl_idname)
+    draw_run(layout, "seip.simulate_traffic")
     if not simulation.facts:
         return
     draw_sentence(layout, f"{simulation.facts}. {USED}")
@@ -110,7 +104,7 @@ def draw_detection(layout: bpy.types.UILayout, context: bpy.types.Context) -> No
         draw_path(layout, detection, "runs", placeholder=traffic_folder(Path(bpy.data.filepath)).name)
         draw_path(layout, detection, "detector", placeholder="Shipped")
         draw_path(layout, detection, "folder")
-        draw_run(layout, SEIP_OT_detect.bl_idname)
+        draw_run(layout, "seip.detect")
     if detection.record:
         _draw_found(layout, scene)
 
@@ -161,7 +155,7 @@ def draw_verification(layout: bpy.types.UILayout, context: bpy.types.Context) ->
     reason = why_no_verification(scene)
     if reason and reason != NO_RECORDING:  # an empty field says so itself
         draw_sentence(layout, reason, icon="INFO")
-    draw_run(layout, SEIP_OT_verify.bl_idname)
+    draw_run(layout, "seip.verify")
     sentences = sentences_of(scene)
     if not sentences:
         return
@@ -172,7 +166,7 @@ def draw_verification(layout: bpy.types.UILayout, context: bpy.types.Context) ->
     if changed:
         draw_sentence(box, changed, icon="INFO", reserved=BOX)
     row = box.row(align=True)
-    row.operator(SEIP_OT_correct_scene.bl_idname, icon="ADD")
+    row.operator("seip.correct_scene", icon="ADD")
     row.operator("wm.path_open", text="Show Picture", icon="IMAGE_DATA").filepath = str(picture_of(scene))
 
 
@@ -199,8 +193,8 @@ def draw(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     if reason and traffic.file:  # an empty field says so itself
         draw_sentence(layout, reason, icon="INFO")
     row = layout.row(align=True)
-    draw_run(row, SEIP_OT_load_traffic.bl_idname)
-    row.operator(SEIP_OT_clear_traffic.bl_idname, text="", icon="TRASH")
+    draw_run(row, "seip.load_traffic")
+    row.operator("seip.clear_traffic", text="", icon="TRASH")
     row.operator("screen.animation_play", text="", icon="PLAY")
     for line in traffic.loaded.splitlines():
         draw_sentence(layout, line)
@@ -229,7 +223,7 @@ def _draw_scan(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     column.prop(traffic, "noise")
     column.prop(traffic, "seed")
     column.prop(traffic, "rolling_shutter")
-    draw_run(layout, SEIP_OT_scan_frame.bl_idname)
+    draw_run(layout, "seip.scan_frame")
     scan = session.scan_of(context.scene)
     for line in scan.facts if scan is not None else ():
         draw_sentence(layout, line)
@@ -252,4 +246,4 @@ def _draw_dataset(layout: bpy.types.UILayout, context: bpy.types.Context) -> Non
     column.prop(traffic, "split")
     layout.label(text="Formats")
     layout.column(align=True).prop(traffic, "formats")
-    draw_run(layout, SEIP_OT_write_dataset.bl_idname)
+    draw_run(layout, "seip.write_dataset")

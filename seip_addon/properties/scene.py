@@ -8,6 +8,7 @@ from bpy.props import BoolProperty, CollectionProperty, EnumProperty, IntPropert
 from .. import last_scan, selection
 from ..scene_status import FILE_VERSION
 from ..viewport import coverage
+from .conversion import path_property
 from .placement import SEIP_PG_goal
 from .simulation import SEIP_PG_simulation
 from .site import SEIP_PG_site
@@ -37,12 +38,8 @@ class SEIP_PG_result(SEIP_PG_placement):
         description="Click to select the sensor in the scene",
         update=selection.select_sensor,
     )
-    folder: StringProperty(
-        name="Folder",
-        description="Folder for the result; // is the folder of the .blend",
-        subtype="DIR_PATH",
-        default="//seip-result/",
-        options={"OUTPUT_PATH", "PATH_SUPPORTS_BLEND_RELATIVE"},
+    folder: path_property(
+        "Folder", "Folder for the result; // is the folder of the .blend", folder=True, default="//seip-result/"
     )
     render: BoolProperty(
         name="Include Rendered View",
@@ -54,25 +51,20 @@ class SEIP_PG_result(SEIP_PG_placement):
 class SEIP_PG_detection(bpy.types.PropertyGroup):
     """Settings of detection, and the latest figures."""
 
-    runs: StringProperty(
-        name="Runs",
-        description="Folder with runs of traffic (.npz) to detect road users in, four or more for an interval. "
+    runs: path_property(
+        "Runs",
+        "Folder with runs of traffic (.npz) to detect road users in, four or more for an interval. "
         "Empty for the folder SCENE_traffic beside the file",
-        subtype="DIR_PATH",
-        options={"PATH_SUPPORTS_BLEND_RELATIVE"},
+        folder=True,
     )
-    detector: StringProperty(
-        name="Detector",
-        description="A trained detector (.pt) of your own; empty for the one that comes with the project",
-        subtype="FILE_PATH",
-        options={"PATH_SUPPORTS_BLEND_RELATIVE"},
+    detector: path_property(
+        "Detector", "A trained detector (.pt) of your own; empty for the one that comes with the project"
     )
-    folder: StringProperty(
-        name="Folder",
-        description="Folder for figures, charts and detections; // is the folder of the .blend",
-        subtype="DIR_PATH",
+    folder: path_property(
+        "Folder",
+        "Folder for figures, charts and detections; // is the folder of the .blend",
+        folder=True,
         default="//seip-detection/",
-        options={"OUTPUT_PATH", "PATH_SUPPORTS_BLEND_RELATIVE"},
     )
     record: StringProperty(name="Record", description="Figures as in detection.json")
     sensors: StringProperty(name="Sensors", description="Digest of the sensors of the figures")
@@ -81,12 +73,10 @@ class SEIP_PG_detection(bpy.types.PropertyGroup):
 class SEIP_PG_verification(bpy.types.PropertyGroup):
     """Recording of the installed sensors."""
 
-    recording: StringProperty(
-        name="Recording",
-        description="Folder with a folder of sweeps for each sensor, named after it, or a .pcap of an Ouster sensor. "
+    recording: path_property(
+        "Recording",
+        "Folder with a folder of sweeps for each sensor, named after it, or a .pcap of an Ouster sensor. "
         "To choose a folder, open it and press Accept with no file chosen",
-        subtype="FILE_PATH",
-        options={"PATH_SUPPORTS_BLEND_RELATIVE"},
     )
     found: StringProperty(
         name="Found", description="Results of the last verification, one sentence a line", options={"HIDDEN"}
@@ -120,12 +110,10 @@ class SEIP_PG_view(bpy.types.PropertyGroup):
         ),
         update=_recolour,
     )
-    picture: StringProperty(
-        name="Picture",
-        description="PNG to write; where one of that name is there already, the next gets a number",
-        subtype="FILE_PATH",
+    picture: path_property(
+        "Picture",
+        "PNG to write; where one of that name is there already, the next gets a number",
         default="//placement.png",
-        options={"OUTPUT_PATH", "PATH_SUPPORTS_BLEND_RELATIVE"},
     )
 
 
