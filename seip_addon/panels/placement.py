@@ -15,6 +15,7 @@ from ..core.counts import counted, duration_text
 from ..core.output.results.answer import answer, sentence, status_text
 from ..core.output.results.placement_file import parsed_record
 from ..core.output.results.placement_record import PlacementRecord, relevant_warnings
+from ..core.site.obstruction import NO_OBSTACLES_MESSAGE
 from ..core.workflows.traffic_runs import traffic_folder
 from ..operators.results import no_placement
 from ..operators.sensors import SEIP_MT_survey_presets
@@ -32,6 +33,7 @@ _SHOWN = {
 """Properties of the objective that are shown for each kind of scenarios."""
 
 
+BARE = sentence(NO_OBSTACLES_MESSAGE)
 NAME_SHARE = 0.68
 """Share of a row that the name of a figure takes."""
 NUMBER_SHARE = 0.3
@@ -89,6 +91,8 @@ def draw(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     obstacle = scene_status.obstacle(scene)
     if obstacle:
         draw_sentence(layout, obstacle, icon="ERROR")
+    elif any(one.text == BARE for one in scene.seip.site.problems) and not scene_status.stale_check(scene):
+        draw_sentence(layout, BARE, icon="ERROR")  # the result says little of a real site: not only in a closed section
     if not no_placement(scene):
         _draw_answer(layout, scene)
     elif scene_status.has_unevaluated(scene):

@@ -10,8 +10,10 @@ import pytest
 
 from seip_addon.core.site.installed_cost import load_installed_cost
 from seip_addon.core.world.elevation.at_place import TerrainRequest
+from seip_addon.panels import placement
 from seip_addon.scene import contract
 from seip_addon.scene.read import read_scene
+from tests.builders.drawn_layout import DrawnLayout
 
 SCENES = Path(__file__).resolve().parents[2] / "scenes"
 MAP = SCENES / "junction.xodr"
@@ -75,6 +77,20 @@ def test_a_site_of_the_same_place_is_changed_and_one_of_another_place_is_a_scene
     other = next(each for each in bpy.data.scenes if each != scene)
     assert contract.find(other, contract.ROADS) != contract.find(scene, contract.ROADS)
     assert other.seip.site.source == scene.seip.site.source
+
+
+def test_a_site_of_a_map_without_obstacles_says_so_where_sensors_are_placed(scene):
+    choose(scene, radius=20.0)
+    bpy.ops.seip.build_site()
+    bpy.ops.seip.check_site()
+    assert placement.BARE in [one.text for one in scene.seip.site.problems]
+    layout = DrawnLayout()
+    placement.draw(layout, bpy.context)
+    assert placement.BARE in " ".join(layout.text.split())
+    bpy.ops.mesh.primitive_cube_add(size=8.0, location=(6.0, 10.0, 4.0))
+    contract.find(scene, contract.OCCLUDERS).objects.link(bpy.context.object)
+    bpy.ops.seip.check_site()
+    assert placement.BARE not in [one.text for one in scene.seip.site.problems]
 
 
 @pytest.mark.parametrize(
