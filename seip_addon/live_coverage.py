@@ -138,6 +138,4 @@ def _handlers() -> tuple[tuple[str, Callable[..., None]], ...]:
     return (("depsgraph_update_post", _on_update), ("undo_post", _on_undo), ("redo_post", _on_undo))
 
 
-def forget() -> None:
-    """Follow no sensors: another file is opened, or the add-on is disabled."""
-    stop()
+forget = stop  # another file is opened, or the add-on is disabled

@@ -92,7 +92,7 @@ def current_step(scene: bpy.types.Scene) -> str:
 
 def search_seconds(scene: bpy.types.Scene) -> float | None:
     """Return an approximate upper limit of the time of a search in seconds; None if visibility is not computed yet."""
-    state = session.state_of(scene)
+    state = session.of(scene).state
     if state is None or state.survey is None or stale_survey(scene):
         return None
     return float(scene.seip.survey.effort)
@@ -100,7 +100,7 @@ def search_seconds(scene: bpy.types.Scene) -> float | None:
 
 def stale_survey(scene: bpy.types.Scene) -> str:
     """Return why the survey of a scene is not of the scene as it is, in a sentence; empty if it is."""
-    state = session.state_of(scene)
+    state = session.of(scene).state
     if state is None:
         return ""
     if state.watch.changed:
@@ -114,7 +114,7 @@ def stale_survey(scene: bpy.types.Scene) -> str:
 
 def stale_placement(scene: bpy.types.Scene) -> str:
     """Return why the scene's placement is not of the scene as it is, in a sentence; empty if it is."""
-    state = session.state_of(scene)
+    state = session.of(scene).state
     if state is None:
         return NOT_COMPARED
     record = parsed_record(scene.seip.result.record)
@@ -132,7 +132,7 @@ def other_goal(scene: bpy.types.Scene) -> str:
 
 def stale_check(scene: bpy.types.Scene) -> str:
     """Return why the scene's check is not of the scene as it is, in a sentence; empty if it is."""
-    check = session.checks.get(scene.session_uid)
+    check = session.of(scene).check
     if check is None:
         return OLD_CHECK
     if check.watch.changed:

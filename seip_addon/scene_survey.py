@@ -46,7 +46,7 @@ def survey(scene: bpy.types.Scene) -> Generator[Progress, None, SceneState]:
     settings.models()  # refuses before the scene is read
     catalogues = tuple((path, path.stat().st_mtime_ns) for path in settings.catalogue)
     resources = Resources(preferences.cache_folder(), preferences.cores())
-    state = session.state_of(scene)
+    state = session.of(scene).state
     if state is not None and not state.watch.look(scene) and state.catalogues == catalogues:
         if same_grid(settings, state.layout.settings):
             layout = replace(state.layout, settings=settings)
@@ -149,7 +149,7 @@ def _compare() -> None:
     """Compare each window's scene with its placement, one: there is one piece of work at a time."""
     for window in bpy.context.window_manager.windows:
         scene = window.scene
-        unknown = session.state_of(scene) is None and scene.seip.result.record
+        unknown = session.of(scene).state is None and scene.seip.result.record
         if session.running is None and unknown and not obstacle(scene):
             with (
                 bpy.context.temp_override(window=window),

@@ -59,13 +59,14 @@ def list_types(scene: bpy.types.Scene) -> None:
 
 @bpy.app.handlers.persistent  # type: ignore[untyped-decorator]
 def _after_load(*_: object) -> None:
-    """List the types; sensors that a command has placed show which of them it chose from."""
+    """List the types; where a command has placed sensors, use their types if none of them was chosen."""
     refresh()
     for scene in bpy.data.scenes:
         if scene.library is None and scene_status.has_unevaluated(scene):
             there = {obj.get(contract.SENSOR) for obj in labelled_sensors(scene, hidden=True).values()}
-            for one in scene.seip.survey.types:
-                one.use = one.name in there
+            if not there & set(scene.seip.survey.used_types()):
+                for one in scene.seip.survey.types:
+                    one.use = one.name in there
 
 
 def attach() -> None:

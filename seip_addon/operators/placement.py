@@ -51,7 +51,7 @@ class SEIP_OT_compute_visibility(ForReadyScene, LongWork[tuple[SceneState, Surve
     def conclude(self, scene: bpy.types.Scene, result: tuple[SceneState, Survey]) -> None:
         """Hold the grid."""
         state, survey = result
-        session.keep_state(scene, state)
+        session.of(scene).state = state
         site = survey.site
         targets, poses = counted(len(site.targets), "target"), counted(len(site.candidates), "pose")
         self.report({"INFO"}, f"visibility of {targets} from {poses} is known")
@@ -70,7 +70,7 @@ class SEIP_OT_compare_scene(ForReadyScene, LongWork[SceneState], bpy.types.Opera
 
     def conclude(self, scene: bpy.types.Scene, result: SceneState) -> None:
         """Hold what was read: the panel compares."""
-        session.keep_state(scene, result)
+        session.of(scene).state = result
 
 
 class _Placing(LongWork[SceneState]):

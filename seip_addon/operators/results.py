@@ -238,7 +238,7 @@ class SEIP_OT_follow_sensors(ForPlacement, LongWork[_Following], bpy.types.Opera
     def conclude(self, scene: bpy.types.Scene, result: _Following) -> None:
         """Begin to follow."""
         state, model, returns = result
-        session.keep_state(scene, state)
+        session.of(scene).state = state
         live_coverage.start(scene, state, model, returns)
 
 
@@ -311,7 +311,7 @@ def keep_result(scene: bpy.types.Scene, state: SceneState, record: PlacementReco
     for sensor in solution.deployment.sensors:
         kept.sensors.add().name = sensor.label
     bpy.context.window_manager.seip_sections.follow_steps()
-    session.keep_state(scene, replace(state, record=kept.record))
+    session.of(scene).state = replace(state, record=kept.record)
 
 
 class _Writes(ForPlacement, LongWork[Result]):
@@ -341,7 +341,7 @@ class SEIP_OT_export_result(_Writes[SceneState], bpy.types.Operator):
 
     def conclude(self, scene: bpy.types.Scene, result: SceneState) -> None:
         """Report where the files are."""
-        session.keep_state(scene, result)
+        session.of(scene).state = result
         self.report({"INFO"}, f"written to {self._folder}")
 
 
@@ -389,7 +389,7 @@ class SEIP_OT_write_report(_Writes[tuple[SceneState, tuple[Path, ...]]], bpy.typ
     def conclude(self, scene: bpy.types.Scene, result: tuple[SceneState, tuple[Path, ...]]) -> None:
         """Report where the files are."""
         state, written = result
-        session.keep_state(scene, state)
+        session.of(scene).state = state
         self.report({"INFO"}, f"written: {' and '.join(path.name for path in written)} in {written[0].parent}")
 
 

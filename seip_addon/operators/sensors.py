@@ -71,7 +71,10 @@ class SEIP_OT_empty_cache(Conditional, ShortWork, bpy.types.Operator):
     bl_idname = "seip.empty_cache"
     bl_label = "Empty Cache"
 
-    obstacles = (lambda _: "Wait for the work under way" if session.running else preferences.why_not_empty(),)
+    obstacles = (
+        lambda _: "Wait for the work under way" if session.running else "",
+        lambda _: "" if preferences.kept_visibility().megabytes() else "The cache is empty",
+    )
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Outcome:
         """Ask first."""
@@ -80,7 +83,7 @@ class SEIP_OT_empty_cache(Conditional, ShortWork, bpy.types.Operator):
 
     def act(self, _context: bpy.types.Context) -> None:
         """Delete it."""
-        count = preferences.empty_cache()
+        count = preferences.kept_visibility().empty()
         self.report({"INFO"}, f"{counted(count, 'file')} deleted")
 
 

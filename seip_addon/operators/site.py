@@ -389,7 +389,7 @@ class SEIP_OT_check_site(LongWork[SiteCheck], bpy.types.Operator):
 
     def conclude(self, scene: bpy.types.Scene, result: SiteCheck) -> None:
         """List what was found."""
-        session.checks[scene.session_uid] = CheckedScene(self._watch, self._settings)
+        session.of(scene).check = CheckedScene(self._watch, self._settings)
         site = scene.seip.site
         site.checked = True
         site.counts.clear()

@@ -70,7 +70,7 @@ def show_traffic(scene: bpy.types.Scene, traffic: SceneTraffic, warnings: Sequen
     """Animate road users read from files, in place of earlier ones and of their scan, and note what there is."""
     animate(scene, traffic.trajectories)
     last_scan.hide_cloud(scene)
-    session.traffic[scene.session_uid] = traffic
+    session.of(scene).traffic = traffic
     scene.seip.traffic.loaded = "\n".join((*_facts(traffic.trajectories), *warnings))
 
 
@@ -87,7 +87,7 @@ class SEIP_OT_clear_traffic(Conditional, bpy.types.Operator):
         """Take it out."""
         scene = context.scene
         clear_traffic(scene)
-        session.traffic.pop(scene.session_uid, None)
+        session.of(scene).traffic = None
         last_scan.hide_cloud(scene)
         scene.seip.traffic.loaded = ""
         return {"FINISHED"}
@@ -104,7 +104,7 @@ class SEIP_OT_scan_frame(Conditional, LongWork[LastScan], bpy.types.Operator):
     def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, LastScan]:
         """Read what is scanned."""
         self._scene_read = _SceneRead(scene)
-        return _scanned(self._scene_read, last_scan.now(scene), session.scan_of(scene))
+        return _scanned(self._scene_read, last_scan.now(scene), session.of(scene).scan)
 
     def conclude(self, scene: bpy.types.Scene, result: LastScan) -> None:
         """Show the points."""
@@ -183,7 +183,7 @@ class _SceneRead:
     def keep_traffic(self, scene: bpy.types.Scene) -> None:
         """Hold what was read from files, so that the next scan need not."""
         if self._files is not None and self._trajectories is not None:
-            session.traffic[scene.session_uid] = SceneTraffic(self._files, self._changed, self._trajectories)
+            session.of(scene).traffic = SceneTraffic(self._files, self._changed, self._trajectories)
 
 
 def _facts(trajectories: Trajectories) -> list[str]:

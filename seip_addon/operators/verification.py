@@ -10,6 +10,7 @@ from tempfile import TemporaryDirectory
 import bpy
 
 from .. import live_coverage, preferences, scene_status
+from ..core.errors import SeipError
 from ..core.output.pictures.verification import save_changes_picture, save_returns_chart
 from ..core.output.results.file_names import VERIFICATION_FILE, VERIFICATION_FOLDER, VERIFICATION_PICTURES
 from ..core.output.results.verification_text import summary
@@ -67,7 +68,7 @@ def why_no_verification(scene: bpy.types.Scene) -> str:
 
 def why_no_correction(scene: bpy.types.Scene) -> str:
     """Return why the scene cannot be corrected by the last verification, or ""."""
-    last = session.verification_of(scene)
+    last = session.of(scene).verification
     if last is None:
         return NOT_VERIFIED
     return CHANGED if last.watch.changed else ""
@@ -78,9 +79,10 @@ def sentences_of(scene: bpy.types.Scene) -> tuple[str, ...]:
     return tuple(scene.seip.verification.found.splitlines())
 
 
-def picture_of(scene: bpy.types.Scene) -> Path:
-    """Return where the picture of a scene's last verification was written."""
-    return _folder_of(scene) / CHANGES
+def picture_of(scene: bpy.types.Scene) -> Path | None:
+    """Return the picture of a scene's last verification, None where it is gone."""
+    path = None if no_folder(scene) else _folder_of(scene) / CHANGES
+    return path if path is not None and path.is_file() else None
 
 
 def _folder_of(scene: bpy.types.Scene) -> Path:
@@ -119,7 +121,7 @@ class SEIP_OT_verify(Conditional, LongWork[_Verified], bpy.types.Operator):
             with whole_file(self._folder / name) as temporary:
                 temporary.write_bytes(content)
         scene.seip.verification.found = "\n".join(result.sentences)
-        session.verifications[scene.session_uid] = LastVerification(result.found, self._watch)
+        session.of(scene).verification = LastVerification(result.found, self._watch)
         for sentence in result.found.warnings:
             self.report({"WARNING"}, sentence)
         self.report({"INFO"}, f"verified; written to {self._folder}")
@@ -162,7 +164,9 @@ class SEIP_OT_correct_scene(Conditional, ShortWork, bpy.types.Operator):
     def act(self, context: bpy.types.Context) -> None:
         """Correct the scene."""
         scene = context.scene
-        last = session.verifications[scene.session_uid]
+        last = session.of(scene).verification
+        if last is None:
+            raise SeipError(NOT_VERIFIED)
         live_coverage.stop()
         problems = correct_scene(scene, last.found)
         last.watch.look(scene)  # so that nothing is added twice

@@ -59,7 +59,7 @@ class SEIP_OT_colour_coverage(Conditional, bpy.types.Operator):
         """Colour it."""
         outcome = attempt(self, lambda: colour_coverage(context.scene, self.aspect))
         if outcome == {"FINISHED"}:
-            coverage.show(context.scene)
+            context.scene.seip.view.legend = True
             view = context.space_data
             if isinstance(view, bpy.types.SpaceView3D) and not coverage.shows_coverage(view):
                 coverage.set_shading(view)
@@ -91,7 +91,7 @@ class SEIP_OT_show_sight_lines(ForPlacement, LongWork[SceneState], bpy.types.Ope
 
     def conclude(self, scene: bpy.types.Scene, result: SceneState) -> None:
         """Draw them."""
-        session.keep_state(scene, result)
+        session.of(scene).state = result
         obj = placed_sensors(scene).get(self.sensor)
         survey, _ = result.placed()
         if obj is None:
@@ -143,7 +143,7 @@ class SEIP_OT_save_picture(ForPlacement, LongWork[SceneState], bpy.types.Operato
 
     def conclude(self, scene: bpy.types.Scene, result: SceneState) -> None:
         """Take the picture of a viewport."""
-        session.keep_state(scene, result)
+        session.of(scene).state = result
         area = getattr(self, "_area", None) or bpy.context.area
         if bpy.app.background or area not in _viewports():
             raise SeipError(

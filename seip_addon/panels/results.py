@@ -33,12 +33,12 @@ ASPECTS: dict[Aspect, str] = {"returns": "Returns", "seen": "Seen", "times": "Se
 def draw_view(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     """Draw what can be shown."""
     scene = context.scene
-    if why_no_coverage(scene) and no_placement(scene) and session.scan_of(scene) is None:
+    if why_no_coverage(scene) and no_placement(scene) and session.of(scene).scan is None:
         draw_sentence(layout, "There is nothing to show yet.", icon="INFO")
         return
     _draw_coverage(layout, context)
     _draw_sight(layout, context)
-    if session.scan_of(scene) is not None:
+    if session.of(scene).scan is not None:
         _draw_cloud(layout, context)
 
 

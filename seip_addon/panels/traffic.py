@@ -18,6 +18,9 @@ from ..operators.traffic import (
     why_no_scan,
 )
 from ..operators.verification import (
+    CHANGED as VERIFY_AGAIN,
+)
+from ..operators.verification import (
     NO_RECORDING,
     picture_of,
     sentences_of,
@@ -167,12 +170,18 @@ def draw_verification(layout: bpy.types.UILayout, context: bpy.types.Context) ->
         draw_sentence(box, changed, icon="INFO", reserved=BOX)
     row = box.row(align=True)
     row.operator("seip.correct_scene", icon="ADD")
-    row.operator("wm.path_open", text="Show Picture", icon="IMAGE_DATA").filepath = str(picture_of(scene))
+    if (picture := picture_of(scene)) is not None:
+        row.operator("wm.path_open", text="Show Picture", icon="IMAGE_DATA").filepath = str(picture)
 
 
 def _each_status(scene: bpy.types.Scene) -> dict[str, Status]:
     """Return the status of each section that has one."""
-    return {"simulation": _simulation_status(scene), "detection": _detection_status(scene)}
+    stale = bool(sentences_of(scene)) and why_no_correction(scene) == VERIFY_AGAIN
+    return {
+        "simulation": _simulation_status(scene),
+        "detection": _detection_status(scene),
+        "verification": Status(stale),
+    }
 
 
 def status(scene: bpy.types.Scene) -> Status:
@@ -224,7 +233,7 @@ def _draw_scan(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     column.prop(traffic, "seed")
     column.prop(traffic, "rolling_shutter")
     draw_run(layout, "seip.scan_frame")
-    scan = session.scan_of(context.scene)
+    scan = session.of(context.scene).scan
     for line in scan.facts if scan is not None else ():
         draw_sentence(layout, line)
 

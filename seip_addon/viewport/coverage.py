@@ -21,11 +21,6 @@ AREAS = (
 SHOWN_BY = {"MATERIAL", "VERTEX"}  # ways to colour Solid shading that show the coverage
 
 
-def show(scene: bpy.types.Scene) -> None:
-    """Show the legend of a scene's coverage, from now on and when the file is opened again."""
-    scene.seip.view.legend = True
-
-
 def update(scene: bpy.types.Scene) -> None:
     """Show the legend where the scene wants one and has coverage, otherwise none."""
     if scene.seip.view.legend and coverage_of(scene) is not None:
@@ -36,7 +31,7 @@ def update(scene: bpy.types.Scene) -> None:
 
 def show_colours(scene: bpy.types.Scene) -> None:
     """Show a scene's coverage with its legend, in all views of Solid shading."""
-    show(scene)
+    scene.seip.view.legend = True
     areas = (area for one in bpy.context.window_manager.windows if one.scene == scene for area in one.screen.areas)
     for view in (area.spaces.active for area in areas if area.type == "VIEW_3D"):
         if view.shading.type == "SOLID" and not shows_coverage(view):

@@ -154,7 +154,7 @@ def test_an_evaluated_deployment_is_kept_compared_and_exported(placed, tmp_path)
     assert comparable(load_placement(out / "placement.json")) == comparable(written)
     again = list(csv.DictReader((out / "candidates.csv").read_text(encoding="utf-8").splitlines()))
     assert again == rows
-    assert session.state_of(scene).solution.certificate == MOVED_MESSAGE
+    assert session.of(scene).state.solution.certificate == MOVED_MESSAGE
 
 
 def test_an_export_that_fails_or_is_stopped_leaves_the_earlier_one_whole(placed, tmp_path, monkeypatch):

@@ -41,7 +41,7 @@ def test_panel_and_batch_write_the_same_placement(junction, tmp_path, small_scen
     assert "With fewer or more sensors under the same rules" in (tmp_path / "panel" / "report.html").read_text(
         encoding="utf-8"
     )
-    key = session.state_of(junction).survey.grid.key
+    key = session.of(junction).state.survey.grid.key
     written = tmp_path / "panel"
     assert offered() == [str(path) for path in (written / "plan.png", written / "report.html", written)]
     junction.seip.goal.count = 1
@@ -128,13 +128,13 @@ def test_work_that_is_stopped_at_its_end_leaves_no_trace(junction):
     bpy.ops.seip.solve_placement()
     junction.seip.goal.count = 3
     junction.seip.survey.effort = 30.0
-    before = session.state_of(junction)
+    before = session.of(junction).state
     seen = dict(vars(before))
     placed = finish(work_of("SEIP_OT_solve_placement", junction))
     assert len(placed.solution.deployment.sensors) == 3
     for name in ("compute_visibility", "follow_sensors", "save_picture"):
         finish(work_of(f"SEIP_OT_{name}", junction))
-        assert session.state_of(junction) is before
+        assert session.of(junction).state is before
         assert vars(before) == seen
 
 
@@ -145,7 +145,7 @@ def test_a_saved_placement_goes_on_without_computing(junction, tmp_path, monkeyp
     bpy.ops.wm.save_as_mainfile(filepath=str(path))
     bpy.ops.wm.open_mainfile(filepath=str(path))
     scene = bpy.context.scene
-    assert session.state_of(scene) is None
+    assert session.of(scene).state is None
     assert scene.seip.result.record == before
     for forbidden in ("compute_visibility", "optimise"):
         monkeypatch.setattr(f"seip_addon.core.sensing.visibility.store.{forbidden}", None, raising=False)
@@ -169,7 +169,7 @@ def test_undo_brings_the_earlier_placement_back_and_redo_the_new(junction):
     assert labels(scene) == ["S1", "S2"]
     assert len(json.loads(scene.seip.result.record)["sensors"]) == 2
     bpy.ops.seip.follow_sensors()
-    assert len(session.state_of(scene).solution.deployment.sensors) == 2
+    assert len(session.of(scene).state.solution.deployment.sensors) == 2
     bpy.ops.ed.redo()
     assert labels(bpy.context.scene) == ["S1", "S2", "S3"]
 

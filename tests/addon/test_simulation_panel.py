@@ -48,7 +48,7 @@ def test_runs_are_those_of_the_command_and_used_by_the_next_buttons(site, tmp_pa
     scene, seip = site, site.seip
     assert (seip.detection.runs, seip.goal.runs) == ("//seip-traffic/", "//seip-traffic/")
     assert seip.traffic.file == "//seip-traffic/run-1.npz"
-    users = len(session.traffic[scene.session_uid].trajectories)
+    users = len(session.of(scene).traffic.trajectories)
     assert len(bpy.data.collections["SEIP Traffic"].objects) == users
     assert seip.traffic.loaded.startswith(f"{users} road users, 0 to 4.8 s")
     assert bpy.ops.seip.load_traffic() == {"FINISHED"}

@@ -12,12 +12,12 @@ from seip_addon.session import SceneState, session
 @pytest.fixture
 def known(junction):
     bpy.ops.seip.compute_visibility()
-    return session.state_of(junction)
+    return session.of(junction).state
 
 
 def read_again(known: SceneState) -> bool:
     bpy.ops.seip.compute_visibility()
-    return session.state_of(bpy.context.scene).layout.geometry is not known.layout.geometry
+    return session.of(bpy.context.scene).state.layout.geometry is not known.layout.geometry
 
 
 def building() -> bpy.types.Object:
@@ -66,7 +66,7 @@ def test_a_scene_that_no_longer_counts_in_metres_is_refused_although_it_was_read
 def test_a_change_is_noticed_at_once_and_read(known):
     for change in (move, reshape, add, modify, hide, delete):
         assert scene_status.stale_survey(bpy.context.scene) == ""
-        known = session.state_of(bpy.context.scene)
+        known = session.of(bpy.context.scene).state
         change()
         bpy.context.view_layer.update()
         assert scene_status.stale_survey(bpy.context.scene) == "The scene has changed since it was computed."
@@ -79,7 +79,7 @@ def test_a_change_that_is_undone_is_noticed(known):
     reshape()
     bpy.ops.ed.undo_push(message="after")
     bpy.ops.seip.compute_visibility()
-    reshaped = session.state_of(bpy.context.scene)
+    reshaped = session.of(bpy.context.scene).state
     bpy.ops.ed.undo()
     assert read_again(reshaped)
 

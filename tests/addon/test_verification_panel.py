@@ -148,7 +148,7 @@ def test_stopped_work_leaves_nothing(placed, tmp_path):
         next(steps)
     steps.close()
     assert not (tmp_path / "out").exists()
-    assert placed.session_uid not in session.verifications
+    assert session.of(placed).verification is None
 
 
 class _Stub:
@@ -182,7 +182,7 @@ def test_each_mistake_has_its_sentence(placed, tmp_path, wrong, words):
     with pytest.raises(RuntimeError, match=words):
         bpy.ops.seip.verify()
     assert not (tmp_path / "out").exists()
-    assert placed.session_uid not in session.verifications
+    assert session.of(placed).verification is None
 
 
 def test_a_saved_file_keeps_what_was_found(verified, tmp_path):
@@ -194,6 +194,9 @@ def test_a_saved_file_keeps_what_was_found(verified, tmp_path):
     text = drawn().text
     assert all(sentence in text for sentence in (*found, operators.NOT_VERIFIED))
     assert operators.picture_of(bpy.context.scene).is_file()
+    bpy.context.scene.seip.result.folder = ""
+    assert operators.picture_of(bpy.context.scene) is None
+    assert "wm.path_open" not in dict(drawn().operators)
     assert not bpy.ops.seip.correct_scene.poll()
 
 

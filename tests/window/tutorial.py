@@ -335,7 +335,7 @@ def _record() -> dict[str, Any]:
 
 
 def _known() -> SceneState | None:
-    return session.state_of(_scene())
+    return session.of(_scene()).state
 
 
 def _sensors() -> list[bpy.types.Object]:
