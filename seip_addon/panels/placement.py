@@ -23,7 +23,7 @@ from ..scene.sensors import labelled_sensors
 from ..sensor_edits import sensor_edits
 from .sections import BETWEEN, Status, draw_sections
 from .sidebar import RowList, draw_path, draw_run, is_narrow, settings_column
-from .wrapped_text import BOX, draw_sentence, sidebar_width
+from .wrapped_text import BOX, draw_lines, draw_sentence, sidebar_width
 
 _SHOWN = {
     "nominal": ("failures",),
@@ -273,7 +273,7 @@ def _draw_details(layout: bpy.types.UILayout, record: PlacementRecord, *, certai
         for name, value in lines:
             row = column.split(factor=NAME_SHARE)
             draw_sentence(row, name, reserved=BOX + (1.0 - NAME_SHARE) * sidebar_width())
-            row.label(text=value, translate=False)
+            draw_lines(row, [value])
     if certain:
         objective, notes = record.objective, record.notes
         proven = objective.status == "optimal" and not purpose(notes)  # of the coverage that is shown above
