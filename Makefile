@@ -14,7 +14,7 @@
 # make detector    train a detector as the shipped one, at 64 random sites (needs a GPU)
 # make stability   drive every method to where it fails, and write docs/stability.md (an hour)
 # make traffic     simulate the shipped traffic again (installs Eclipse SUMO in the environment: 230 MB)
-# make benchmark   measure speed and error again, and write docs/benchmark.md (20 minutes; 40 with PyTorch)
+# make benchmark   measure speed, gaps and growth again, and write docs/benchmark.md (20 minutes)
 # make extension   build the Blender extension in dist/
 # make lock        write wheels.lock again, the digests of all pinned packages, after a pin has changed
 # make clean       remove what was built; make distclean removes the environment and the wheels as well
@@ -115,7 +115,7 @@ recording: detection
 
 detector: detection sumo
 	$(PY) -m headless study random-sites -o out/sites --sites 64 --seed 1
-	$(PY) -m headless study site-training out/sites/site-*/site.blend --field-conditions --placements 2 --seed 7 \
+	$(PY) -m headless study site-training out/sites/site-*/site.blend --placements 2 --seed 7 \
 	  --steps 13381 --batch 64 --patience 50 --device cuda -o out/detector
 	cp out/detector/detector.pt headless/detection/shipped_detector.pt
 
@@ -123,7 +123,6 @@ stability: environment
 	$(PY) -m headless study stability scenes/junction.blend -o docs
 
 benchmark: environment
-	$(PY) -m pip install -qq --group benchmark
 	$(PY) -m headless study benchmark scenes/junction.blend -o docs
 
 extension: environment

@@ -8,6 +8,8 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from headless.studies.markdown import table
+
 from seip_addon.core.estimates import Interval
 from seip_addon.core.storage.files import whole_file
 
@@ -64,17 +66,7 @@ def worst_verdict(verdicts: Sequence[str]) -> str:
 
 def save_claims(path: str | os.PathLike[str], claims: Sequence[Claim], title: str) -> None:
     """Write claims with their verdicts and figures as a Markdown table."""
-    lines = [
-        f"# {title}: claims of the study on this site",
-        "",
-        "| # | claim | verdict | figures |",
-        "|---|---|---|---|",
-    ]
-    lines += [f"| {c.number} | {_cell(c.text)} | **{c.verdict}** | {_cell(c.evidence)} |" for c in claims]
+    rows = [(f"{claim.number}", claim.text, f"**{claim.verdict}**", claim.evidence) for claim in claims]
+    text = f"# {title}: claims of the study on this site\n\n{table(('#', 'claim', 'verdict', 'figures'), rows)}\n"
     with whole_file(path) as temporary:
-        temporary.write_text("\n".join(lines) + "\n", encoding="utf-8")
-
-
-def _cell(words: str) -> str:
-    """Return text escaped for a cell of a Markdown table."""
-    return words.replace("|", "\\|")
+        temporary.write_text(text, encoding="utf-8")

@@ -6,30 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from seip_addon.core.arrays import Boolean, Float
+from seip_addon.core.arrays import Boolean
 from seip_addon.core.geometry.orientation import orientation as orientation_of
-from seip_addon.core.sensing.lidar.beams import BeamPattern
-from seip_addon.core.sensing.lidar.model import LidarModel
 from seip_addon.core.sensing.visibility.near_surfaces import NearSurfaces, rotated_surfaces
 from seip_addon.core.sensing.visibility.scanning import ScanPosition, seen_by_rays
 from seip_addon.core.sensing.visibility.target_index import TargetIndex
 from seip_addon.core.sensing.visibility.visibility_model import is_upright, yaw_of
-
-
-def beam_directions(model: LidarModel, yaw: float = 0.0) -> Float:
-    """Return the unit directions of one revolution or frame.
-
-    Parameters
-    ----------
-    yaw : float, radians
-        Direction of azimuth zero, counter-clockwise from +x.
-
-    Returns
-    -------
-    (channels, azimuth_count, 3) float64
-    """
-    rays = np.arange(model.channels * model.azimuth_count)
-    return BeamPattern(model, yaw).directions(rays).reshape(model.channels, model.azimuth_count, 3)
 
 
 def seen_by_all_rays(position: ScanPosition, surfaces: NearSurfaces) -> tuple[Boolean, int]:

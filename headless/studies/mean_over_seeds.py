@@ -35,9 +35,4 @@ def mean_interval(values: Sequence[float], possible: Interval = ANYTHING) -> Int
             f"{len(values)} seed gives no interval: repeat the study with at least two, better three or more"
         )
     mean, reach = float(np.mean(values)), student_reach(values)
-    return within((mean - reach, mean + reach), possible)
-
-
-def within(interval: Interval, possible: Interval) -> Interval:
-    """Return the part of an interval that is possible."""
-    return max(interval[0], possible[0]), min(interval[1], possible[1])
+    return max(mean - reach, possible[0]), min(mean + reach, possible[1])

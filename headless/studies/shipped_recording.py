@@ -6,7 +6,7 @@ python -m headless.studies.shipped_recording PLAN.blend RUN.npz SWEEPS
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 from headless import runtime
@@ -51,38 +51,18 @@ def main(argv: list[str]) -> None:
     runtime.open_scene(plan)
     geometry = read_scene(bpy.context.scene).geometry
     planned = read_sensors(bpy.context.scene, load_catalogue(()))
-    site = changed_site(geometry, planned, np.random.default_rng(SEED))
+    geometry, sensors = changed_site(geometry, planned, np.random.default_rng(SEED))
     (sampled,) = sampled_runs([run], geometry.origin, INTERVAL)
-    record_sweeps(output, site, replace(sampled, times=sampled.times[:SWEEPS]), SEED)
-    runtime.print_line(f"{site.gone} is gone, trees at {site.trees.round(1).tolist()}")
-
-
-@dataclass(frozen=True, eq=False)
-class ChangedSite:
-    """Site as it was built, with its differences from the plan.
-
-    Parameters
-    ----------
-    geometry : SceneGeometry
-        The scene as it is.
-    sensors : tuple of MountedSensor
-        The sensors as they are.
-    trees : (n, 2) float64, metres
-        Positions of the new trees.
-    gone : str
-        Name of the building that is gone.
-    """
-
-    geometry: SceneGeometry
-    sensors: tuple[MountedSensor, ...]
-    trees: Float
-    gone: str
+    record_sweeps(output, geometry, sensors, replace(sampled, times=sampled.times[:SWEEPS]))
 
 
 def changed_site(
     geometry: SceneGeometry, planned: tuple[MountedSensor, ...], random: np.random.Generator
-) -> ChangedSite:
-    """Draw an installation: poses off by `DISTANCE` and `ANGLE` in random directions, and visible changes."""
+) -> tuple[SceneGeometry, tuple[MountedSensor, ...]]:
+    """Draw the scene and the sensors of an installation, which differ from the plan.
+
+    Poses are off by `DISTANCE` and `ANGLE` in random directions, a building is gone, and trees are new.
+    """
     static = static_scene(geometry, planned)
     surface = ReflectiveSurface(make_ray_caster(static.triangles), static.reflectivity)
     met = [_met(surface, sensor) for sensor in planned]
@@ -96,16 +76,17 @@ def changed_site(
     added = [_tree_mesh(geometry, number, xy) for number, xy in enumerate(trees, 1)]
     kept = [mesh for mesh in geometry.occluders if mesh is not gone]
     sensors = tuple(_off(sensor, random) for sensor in planned)
-    return ChangedSite(replace(geometry, occluders=(*kept, *added)), sensors, trees, gone.name)
+    runtime.print_line(f"{gone.name} is gone, trees at {trees.round(1).tolist()}")
+    return replace(geometry, occluders=(*kept, *added)), sensors
 
 
-def record_sweeps(folder: Path, site: ChangedSite, run: SampledRun, seed: int) -> None:
+def record_sweeps(folder: Path, geometry: SceneGeometry, sensors: tuple[MountedSensor, ...], run: SampledRun) -> None:
     """Write a recording of a run of traffic: a folder of npz sweeps for each sensor, in the sensor's axes."""
-    simulator = Simulator(site.geometry, ScanSettings(seed=seed, rolling_shutter=True), site.sensors)
-    placed = MountedSensors("installed", site.sensors)
+    simulator = Simulator(geometry, ScanSettings(seed=SEED, rolling_shutter=True), sensors)
+    placed = MountedSensors("installed", sensors)
     for number in range(len(run.times)):
         frame = simulator.frame(placed, run, number)
-        for index, sensor in enumerate(site.sensors):
+        for index, sensor in enumerate(sensors):
             own = frame.sensor == index
             points = (frame.points[own] - sensor.xyz) @ sensor.orientation
             rounded = np.round(points / RESOLUTION) * RESOLUTION
@@ -114,7 +95,7 @@ def record_sweeps(folder: Path, site: ChangedSite, run: SampledRun, seed: int) -
             path.parent.mkdir(parents=True, exist_ok=True)
             np.savez_compressed(path, points=np.column_stack([rounded, intensity]).astype(np.float32))
     times = "".join(f"{time:.3f}\n" for time in run.times - run.times[0])
-    for sensor in site.sensors:
+    for sensor in sensors:
         (folder / sensor.label / "timestamps.txt").write_text(times, encoding="utf-8")
 
 

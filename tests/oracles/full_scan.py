@@ -6,13 +6,30 @@ from headless.studies.full_scan import seen_by_tilted_full_scan
 
 import numpy as np
 
-from seip_addon.core.arrays import Boolean
+from seip_addon.core.arrays import Boolean, Float
+from seip_addon.core.sensing.lidar.beams import BeamPattern
 from seip_addon.core.sensing.lidar.model import LidarModel
 from seip_addon.core.sensing.visibility.near_surfaces import near_surfaces
 from seip_addon.core.sensing.visibility.ray_casting import RayCaster
 from seip_addon.core.sensing.visibility.scanning import ScanPosition
 from seip_addon.core.sensing.visibility.settings import VisibilitySettings
 from seip_addon.core.site.site import Site
+
+
+def beam_directions(model: LidarModel, yaw: float = 0.0) -> Float:
+    """Return the unit directions of one revolution or frame.
+
+    Parameters
+    ----------
+    yaw : float, radians
+        Direction of azimuth zero, counter-clockwise from +x.
+
+    Returns
+    -------
+    (channels, azimuth_count, 3) float64
+    """
+    rays = np.arange(model.channels * model.azimuth_count)
+    return BeamPattern(model, yaw).directions(rays).reshape(model.channels, model.azimuth_count, 3)
 
 
 def full_scan(

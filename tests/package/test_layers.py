@@ -164,7 +164,7 @@ def test_the_add_on_never_names_itself():
 
 
 def test_what_is_imported_is_pinned():
-    """Torch may be imported by the detector alone, Dask and spopt where they are of use; SciPy is for oracles."""
+    """Torch may be imported by the detector alone, Dask where it is of use; SciPy is for oracles."""
     ours = {
         "contourpy",
         "defusedxml",
@@ -185,7 +185,6 @@ def test_what_is_imported_is_pinned():
         "network_tasks.py": {"distributed"},
         "lock_wheels.py": {"packaging"},
         "extract.py": {"osmium"},
-        "baselines.py": {"spopt"},
     }
 
     def allowed(path, name):

@@ -3,8 +3,6 @@
 import math
 from dataclasses import replace
 
-from headless.studies.full_scan import beam_directions
-
 import bpy
 import numpy as np
 import pytest
@@ -21,6 +19,7 @@ from seip_addon.scene.sensors import changed_beams, labelled_sensors, read_senso
 from seip_addon.scene.write import write_result
 from tests.builders.scene_by_hand import make_scene
 from tests.builders.small_junction import make_example
+from tests.oracles.full_scan import beam_directions
 
 CATALOGUE = load_catalogue()
 

@@ -8,7 +8,7 @@ import pytest
 from tests.detection.conftest import WithoutTorch
 
 HERE = Path(__file__).parent
-WITHOUT_TORCH = {"benchmark", "calibration", "coverage", "random_sites", "stability"}
+WITHOUT_TORCH = {"benchmark", "coverage", "random_sites", "stability"}
 SLOW = {"benchmark", "stability"}
 
 

@@ -1,89 +1,171 @@
-"""Benchmark of visibility, placement and scans against alternatives: charts, a page and a JSON file.
+"""Benchmark of visibility, placement and scans: a page with speed, gaps to bounds, and growth.
 
 seip study benchmark scenes/junction.blend -o docs
-seip study benchmark scenes/junction.blend -o docs --only placement
-seip study benchmark scenes/junction.blend -o docs --only sensor-models --site town.blend
 """
 
 import argparse
-from dataclasses import replace
+import importlib.metadata
+import logging
+import os
+from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 
 from headless import runtime
-from headless.studies.benchmark.charts import save_charts
-from headless.studies.benchmark.measurements import BenchmarkScope, compare_sensor_models, measure, with_placement
-from headless.studies.benchmark.report import bars, load_json, save_json, save_page
-from headless.studies.benchmark.sensor_report import save_sensor_model_chart
+from headless.studies.benchmark.growth import Growth, corridor_growth, placement_growth
+from headless.studies.benchmark.placement import METHODS, SolverRun, compare
+from headless.studies.benchmark.report import Findings, requirements, save_page
+from headless.studies.benchmark.resource_usage import in_fresh_process
+from headless.studies.benchmark.scans import scan_costs
+from headless.studies.benchmark.street_visibility import street_problem
+from headless.studies.benchmark.visibility import sampled_positions, visibility_costs
 
 import bpy
 
+from seip_addon.core.choosing.placement.objective import Objective, placement_problem
 from seip_addon.core.progress import finish
+from seip_addon.core.sensing.lidar.catalogue import find_models, load_catalogue
+from seip_addon.core.sensing.lidar.model import LidarModel, fields_of_view
+from seip_addon.core.sensing.scans.static_scene import static_scene
+from seip_addon.core.sensing.visibility.grid import compute_visibility
+from seip_addon.core.sensing.visibility.settings import VisibilitySettings
+from seip_addon.core.site.candidates import PAPER_TYPES, CandidateSettings
+from seip_addon.core.site.scene_geometry import SceneGeometry
+from seip_addon.core.site.site import Site, make_site
 from seip_addon.scene.read import read_scene
+
+LOG = logging.getLogger(__name__)
+
+SITE_SENSORS = 4
+"""Number of sensors that are placed at the scene's site."""
+
+LARGEST_METHODS = ("local search", "ours")
+"""Methods that can solve the largest instance."""
+
+
+@dataclass(frozen=True)
+class BenchmarkScope:
+    """Sizes of the benchmark: the scene's layout, synthetic instances and steps of growth.
+
+    Parameters
+    ----------
+    effort : float
+        Limit of each solve: units of counted work, and seconds for the alternatives.
+    positions : int
+        Number of sampled positions at which full scans and the lazy engine are compared.
+    street : tuple of int
+        Positions (three poses at each), targets, and blocks along a side of the synthetic street grid.
+    counts : tuple of int
+        Small and large number of sensors in the street grid.
+    largest : tuple of int
+        Largest street grid, as ``street``; solved for the large number of sensors.
+    growth_positions : int
+        Number of sampled positions in the measurements of growth.
+    multiples : tuple of int
+        Multiples of the size that grows in the street grids.
+    copies : tuple of int
+        Numbers of copies of the scene in a row.
+    scanned_by : str
+        Type of the sensors that scan traffic.
+    frames : int
+        Number of scanned frames.
+    """
+
+    layout: CandidateSettings = field(default_factory=lambda: CandidateSettings(sensors=PAPER_TYPES))
+    effort: float = 60.0
+    positions: int = 12
+    street: tuple[int, int, int] = (333, 5000, 3)
+    counts: tuple[int, int] = (4, 16)
+    largest: tuple[int, int, int] = (1000, 20000, 8)
+    growth_positions: int = 8
+    multiples: tuple[int, ...] = (1, 2, 4, 8)
+    copies: tuple[int, ...] = (1, 2, 4, 8, 16)
+    scanned_by: str = "type2"
+    frames: int = 10
 
 
 def main(argv: list[str], scope: BenchmarkScope | None = None) -> None:
     """Run the measurements and write the results into a folder; tests pass a small ``scope``."""
-    parser = argparse.ArgumentParser(
-        prog="benchmark", description=__doc__.splitlines()[0], formatter_class=argparse.ArgumentDefaultsHelpFormatter
-    )
+    parser = argparse.ArgumentParser(prog="benchmark", description=__doc__.splitlines()[0])
     parser.add_argument("scene", type=Path, help="scene (.blend)")
-    parser.add_argument("-o", "--output", type=Path, required=True, help="folder for benchmark.md and benchmark/")
-    parser.add_argument(
-        "--places", type=int, default=12, help="number of sampled positions; a full scan of each takes seconds"
-    )
-    parser.add_argument(
-        "--effort",
-        type=float,
-        default=60.0,
-        help="limit of each solve: units of counted work, and seconds for the methods of others",
-    )
-    parser.add_argument(
-        "--only", choices=("placement", "sensor-models"), help="measure only this part; keep the rest of the page"
-    )
-    models = parser.add_argument_group("models of the sensor")
-    models.add_argument(
-        "--site", action="append", type=Path, default=[], metavar="BLEND", help="another scene to measure; repeat it"
-    )
-    models.add_argument("--seed", type=int, default=0, help="seed for placements, scans and the detector's training")
-    models.add_argument("--steps", type=int, default=1800, help="training steps of the detector (only with PyTorch)")
-    models.add_argument("--work", type=Path, default=Path("out/benchmark"), help="folder of the detector")
+    parser.add_argument("-o", "--output", type=Path, required=True, help="folder for benchmark.md")
     options = parser.parse_args(argv)
-    scope = scope or BenchmarkScope()
-    pictures = options.output / "benchmark"
-    runtime.check_folder(pictures)
-    runtime.check_folder(options.work)
-    figures = pictures / "benchmark.json"
-    kept = load_json(figures) if options.only or figures.exists() else None
-    if options.only == "sensor-models" and kept is not None:
-        findings, checks = kept
-    else:
-        runtime.open_scene(options.scene)
-        geometry = read_scene(bpy.context.scene).geometry
-        if options.only and kept is not None:
-            findings, names = with_placement(kept[0], geometry, options.effort, scope)
-        else:
-            findings, names = measure(geometry, options.places, options.effort, scope)
-        checks = bars(findings.costs, findings.runs, names, findings.scans)
-    for bar in checks:
-        verdict = "" if bar.met else " – NOT MET"
-        runtime.print_line(f"{bar.what}: required {bar.asked}, measured {bar.measured}{verdict}")
-    if options.only != "placement":
-        steps = compare_sensor_models(
-            [options.scene, *options.site],
-            options.effort,
-            scope,
-            seed=options.seed,
-            steps=options.steps,
-            work=options.work,
-        )
-        with runtime.progress_bar() as report:
-            models_compared = finish(steps, report).over(kept[0].sensor_models if kept else None)
-        findings = replace(findings, sensor_models=models_compared)
+    runtime.check_folder(options.output)
+    runtime.open_scene(options.scene)
+    findings = measure(read_scene(bpy.context.scene).geometry, scope or BenchmarkScope())
+    for one in requirements(findings):
+        verdict = "" if one.met else " – NOT MET"
+        runtime.print_line(f"{one.quantity}: required {one.required}, measured {one.measured}{verdict}")
     with runtime.incomplete_if_interrupted(options.output):
-        if options.only != "sensor-models":
-            save_charts(pictures, findings)
-        if findings.sensor_models is not None:
-            save_sensor_model_chart(pictures, findings.sensor_models)
-        save_json(figures, findings, checks)
-        save_page(options.output / "benchmark.md", findings, checks, "benchmark")
+        save_page(options.output / "benchmark.md", findings)
     runtime.print_line(f"results: {options.output / 'benchmark.md'}")
+
+
+def measure(geometry: SceneGeometry, scope: BenchmarkScope) -> Findings:
+    """Measure everything, in sequence."""
+    settings = VisibilitySettings()
+    models = find_models(load_catalogue(), scope.layout.sensors)
+    site = make_site(geometry, scope.layout, fields_of_view=fields_of_view(models))
+    LOG.info(f"{site.name}: full and lazy scans from {scope.positions} positions")
+    visibility = visibility_costs(site, models, settings, scope.positions)
+    runs = placement_runs(geometry, settings, scope)
+    growths = measure_growth(site, models, settings, scope)
+    LOG.info("scans of traffic")
+    scans = scan_costs(site, static_scene(geometry), load_catalogue()[scope.scanned_by], scope.frames)
+    setting = {
+        "scene": site.name,
+        "targets": len(site.targets),
+        "poses": len(site.candidates),
+        "triangles": len(site.triangles),
+        "positions": len(sampled_positions(site, scope.positions)),
+        "scanned_by": scope.scanned_by,
+        "frames": scope.frames,
+        "effort": scope.effort,
+        "cores": os.cpu_count(),
+        "versions": {name: importlib.metadata.version(name) for name in ("bpy", "numpy", "embreex", "PuLP", "highspy")},
+    }
+    return Findings(setting, visibility, runs, growths, scans)
+
+
+def placement_runs(geometry: SceneGeometry, settings: VisibilitySettings, scope: BenchmarkScope) -> list[SolverRun]:
+    """Compare placement methods for the scene's first type, in street grids, and in the largest street grid."""
+    first = scope.layout.sensors[0]
+    models = find_models(load_catalogue(), [first])
+    layout = replace(scope.layout, sensors=(first,))
+    site = make_site(geometry, layout, fields_of_view=fields_of_view(models))
+    visible = finish(compute_visibility(site, models, settings)).visible
+    problem = placement_problem(site, visible, models, Objective(count=SITE_SENSORS))
+    problem = replace(problem, mandatory=None, mandatory_names=None, forbidden=None)  # which plain methods do not know
+    runs = compare(f"{site.name}, {first}, N = {SITE_SENSORS}", problem, list(METHODS), scope.effort)
+    for count in scope.counts:
+        positions, targets, blocks = scope.street
+        street = street_problem(positions, targets, blocks=blocks, count=count)
+        runs += compare(_street_name(scope.street, count), street, list(METHODS), scope.effort)
+    positions, targets, blocks = scope.largest
+    street = street_problem(positions, targets, blocks=blocks, count=scope.counts[-1])
+    name = _street_name(scope.largest, scope.counts[-1])
+    # in a process of its own: a requirement limits its memory, and memory of earlier work would hide a part
+    runs += in_fresh_process(partial(compare, name, street, LARGEST_METHODS, 2 * scope.effort))
+    for run in runs:
+        seconds = f"{run.expense.cpu:>8.2f} s of CPU"
+        LOG.info(f"{run.instance}: {run.method:<13}{run.objective:>10.0f} ≤ {run.bound:<10.1f}{seconds}")
+    return runs
+
+
+def measure_growth(
+    site: Site, models: dict[str, LidarModel], settings: VisibilitySettings, scope: BenchmarkScope
+) -> list[Growth]:
+    """Measure growth with copies of the scene side by side, and in street grids."""
+    LOG.info("growth of time and memory, each size in a process of its own")
+    positions, targets, blocks = scope.street
+    more_positions = [(positions * n // scope.multiples[-1], targets, blocks) for n in scope.multiples]
+    more_targets = [(positions, targets * n // 2, blocks) for n in scope.multiples]
+    return [
+        corridor_growth(site, scope.copies, models, settings, scope.growth_positions),
+        placement_growth("poses", [(3 * street[0], street) for street in more_positions], scope.effort),
+        placement_growth("targets", [(street[1], street) for street in more_targets], scope.effort),
+    ]
+
+
+def _street_name(street: tuple[int, int, int], count: int) -> str:
+    return f"{3 * street[0]:,} × {street[1]:,}, N = {count}"

@@ -1,10 +1,8 @@
-"""Cost of frames with cached static returns against frames in which every ray is cast again."""
+"""Speed of simulated frames of traffic."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, field
 from functools import partial
 
 from headless.studies.benchmark.resource_usage import Expense
@@ -12,57 +10,24 @@ from headless.studies.benchmark.visibility import ENGINES
 
 import numpy as np
 
-from seip_addon.core.arrays import Float, Integer
-from seip_addon.core.errors import SeipError
-from seip_addon.core.geometry.orientation import rotations
+from seip_addon.core.arrays import Float
 from seip_addon.core.progress import finish
 from seip_addon.core.sensing.lidar.model import LidarModel
-from seip_addon.core.sensing.lidar.noisy_returns import return_chance
-from seip_addon.core.sensing.scans.frame import STATIC_INSTANCE, Frame
-from seip_addon.core.sensing.scans.scanner import ReflectiveSurface, Scan, Scanner
 from seip_addon.core.sensing.scans.sensor import MountedSensor, level_orientation
-from seip_addon.core.sensing.scans.simulation import ScanSettings, Simulation, prepare
+from seip_addon.core.sensing.scans.simulation import ScanSettings, prepare
 from seip_addon.core.sensing.scans.static_scene import StaticScene
-from seip_addon.core.sensing.traffic.bodies import Body, fitted_body
-from seip_addon.core.sensing.traffic.trajectories import RoadUser, Snapshot, Trajectories
-from seip_addon.core.sensing.visibility.ray_casting import make_ray_caster
-from seip_addon.core.sensing.visibility.settings import Engine
+from seip_addon.core.sensing.traffic.bodies import fitted_body
+from seip_addon.core.sensing.traffic.trajectories import RoadUser, Trajectories
 from seip_addon.core.site.site import Site
 
 SENSORS, ROAD_USERS = 4, 40
-SLACK = 1e-4
-"""Metres by which the same return may differ, and by which a ray may pass an edge to graze it."""
 
-_RAYS_AT_ONCE = 1 << 17
 _SIZES = (("car", 4.5, 1.8, 1.5), ("car", 3.9, 1.7, 1.5), ("van", 5.6, 2.0, 2.4), ("truck", 9.0, 2.5, 3.5))
 _SPEED, _SECONDS, _GAP = 8.0, 10.0, 6.0  # metres per second, seconds, metres
 
 
-@dataclass
-class ScanCost:
-    """Cost of simulated frames.
-
-    Parameters
-    ----------
-    rays : int
-        Rays of all sensors in all frames.
-    differing : int
-        Rays whose return differs from the full scan's; all of them graze an edge or a surface.
-    """
-
-    expense: Expense = field(default_factory=Expense)
-    frames: int = 0
-    rays: int = 0
-    differing: int = 0
-
-    @property
-    def rate(self) -> float:
-        """Frames per second of processor time."""
-        return self.frames / self.expense.cpu
-
-
-def scan_costs(site: Site, static: StaticScene, model: LidarModel, frames: int) -> dict[str, ScanCost]:
-    """Simulate the same frames of four sensors and forty moving road users by both methods with each engine.
+def scan_costs(site: Site, static: StaticScene, model: LidarModel, frames: int) -> dict[str, Expense]:
+    """Simulate the same frames of four sensors and forty moving road users with each ray caster.
 
     Parameters
     ----------
@@ -71,78 +36,25 @@ def scan_costs(site: Site, static: StaticScene, model: LidarModel, frames: int) 
 
     Returns
     -------
-    dict of str to ScanCost
-        Costs by method and engine: ``cached bvh`` and ``cached embree`` (cached returns), ``full bvh`` and
-        ``full embree`` (full scans).
-
-    Raises
-    ------
-    SeipError
-        A return differs from the full scan's, and its ray grazes nothing.
+    dict of str to Expense
+        Cost of all frames by ray caster.
     """
-    places = site.candidates.xyz[np.linspace(0, len(site.candidates) - 1, SENSORS).astype(int)]
+    positions = site.candidates.xyz[np.linspace(0, len(site.candidates) - 1, SENSORS).astype(int)]
     sensors = [
-        MountedSensor(f"S{number + 1}", model, place, level_orientation(0.0)) for number, place in enumerate(places)
+        MountedSensor(f"S{number}", model, xyz, level_orientation(0.0)) for number, xyz in enumerate(positions, start=1)
     ]
-    traffic = driving(site)
+    traffic = moving_traffic(site)
     bodies = [fitted_body(user) for user in traffic.users]
-    costs = {f"{way} {engine}": ScanCost() for engine in ENGINES for way in ("cached", "full")}
+    costs: dict[str, Expense] = {}
     for engine in ENGINES:
         simulation = finish(prepare(static, sensors, traffic, bodies, ScanSettings(engine=engine)))
-        rescan = Rescan(simulation, static, bodies, engine)
-        cached, full = costs[f"cached {engine}"], costs[f"full {engine}"]
+        costs[engine] = Expense()
         for number in range(frames):
-            snapshot = traffic.at(number / model.rotation_rate)
-            cached.expense.time(partial(simulation.frame, number, snapshot.time))
-            full.expense.time(partial(rescan.frame, number, snapshot))
-            cached.differing += rescan.differing(snapshot)
-        cached.frames = full.frames = frames
-        cached.rays = full.rays = frames * sum(len(scanner.directions) for scanner in simulation.scanners)
+            costs[engine].time(partial(simulation.frame, number, number / model.rotation_rate))
     return costs
 
 
-@dataclass(frozen=True, eq=False)
-class Rescan:
-    """Reference simulator of frames, which casts every ray against the whole scene.
-
-    Parameters
-    ----------
-    simulation : Simulation
-        Simulation with cached returns to compare with.
-    bodies : sequence of Body
-        Body of each road user.
-    engine : {"bvh", "embree"}
-        Ray caster.
-    """
-
-    simulation: Simulation
-    static: StaticScene
-    bodies: Sequence[Body]
-    engine: Engine
-
-    def frame(self, number: int, snapshot: Snapshot) -> Frame:
-        """Return the frame that the sensors measure at an instant."""
-        return self.simulation.measure(number, snapshot, self.scans(snapshot)[0])
-
-    def scans(self, snapshot: Snapshot) -> tuple[list[Scan], Float]:
-        """Return the scan of each sensor, and all triangles (n, 3, 3)."""
-        surface, owner = combined(self.static, self.bodies, snapshot, self.engine)
-        scans = [full_scan(scanner, surface, owner, len(self.bodies)) for scanner in self.simulation.scanners]
-        return scans, surface.caster.triangles
-
-    def differing(self, snapshot: Snapshot) -> int:
-        """Return the number of the simulation's rays that differ; raise an error if one of them grazes nothing."""
-        full, triangles = self.scans(snapshot)
-        count = 0
-        for scanner, ours, theirs in zip(self.simulation.scanners, self.simulation.scans(snapshot), full, strict=True):
-            for ray in differing(ours, theirs):
-                if not grazes(scanner.sensor.xyz, scanner.directions[ray], triangles, ours.distance[ray]):
-                    raise SeipError(f"ray {ray} of {scanner.sensor.label} differs from the full scan: a defect")
-                count += 1
-        return count
-
-
-def driving(site: Site) -> Trajectories:
+def moving_traffic(site: Site) -> Trajectories:
     """Return road users of several sizes that start at random targets of the site and drive straight ahead."""
     random = np.random.default_rng(0)
     start: list[Float] = []
@@ -150,93 +62,15 @@ def driving(site: Site) -> Trajectories:
         if len(start) < ROAD_USERS and all(math.dist(xyz[:2], other[:2]) > _GAP for other in start):
             start.append(xyz)
     yaw = random.uniform(-math.pi, math.pi, len(start))
-    way = _SPEED * _SECONDS * np.stack([np.cos(yaw), np.sin(yaw), np.zeros(len(yaw))], axis=1)
+    travel = _SPEED * _SECONDS * np.stack([np.cos(yaw), np.sin(yaw), np.zeros(len(yaw))], axis=1)
     users = [RoadUser(f"{number}", *_SIZES[number % len(_SIZES)]) for number in range(len(start))]
     return Trajectories(
         users=tuple(users),
         origin=site.origin,
         first=2 * np.arange(len(start) + 1),
         time=np.tile([0.0, _SECONDS], len(start)),
-        position=np.stack([start, start + way], axis=1).reshape(-1, 3),
+        position=np.stack([start, start + travel], axis=1).reshape(-1, 3),
         yaw=np.repeat(yaw, 2),
         pitch=np.zeros(2 * len(start)),
         speed=np.full(2 * len(start), _SPEED),
     )
-
-
-def combined(
-    static: StaticScene, bodies: Sequence[Body], snapshot: Snapshot, engine: Engine
-) -> tuple[ReflectiveSurface, Integer]:
-    """Return the surface of the static scene with an instant's road users, and the owner of each triangle."""
-    placed = [
-        position + bodies[user].triangles @ attitude.T
-        for user, position, attitude in zip(
-            snapshot.user, snapshot.position, rotations(snapshot.yaw, snapshot.pitch), strict=True
-        )
-    ]
-    owner = [np.full(len(static.triangles), STATIC_INSTANCE)]
-    owner += [np.full(len(bodies[user].triangles), user) for user in snapshot.user]
-    reflectivity = [static.reflectivity, *(bodies[user].reflectivity for user in snapshot.user)]
-    caster = make_ray_caster(np.concatenate([static.triangles, *placed]), engine)
-    return ReflectiveSurface(caster, np.concatenate(reflectivity)), np.concatenate(owner)
-
-
-def full_scan(scanner: Scanner, surface: ReflectiveSurface, owner: Integer, users: int) -> Scan:
-    """Cast every ray of a sensor against the whole scene."""
-    model, rays = scanner.sensor.model, len(scanner.directions)
-    distance, intensity, reflected = np.full(rays, np.inf), np.zeros(rays), np.zeros(rays)
-    instance = np.full(rays, STATIC_INSTANCE, dtype=np.int32)
-    for begin in range(0, rays, _RAYS_AT_ONCE):
-        directions = scanner.directions[begin : begin + _RAYS_AT_ONCE]
-        far, triangle = surface.caster.cast(scanner.sensor.xyz, directions, model.max_range)
-        hit = np.flatnonzero(triangle >= 0)
-        distance[begin + hit] = far[hit]
-        reflected[begin + hit] = surface.reflected(directions[hit], triangle[hit])
-        intensity[begin + hit] = model.law.intensity(far[hit], reflected[begin + hit])
-        instance[begin + hit] = owner[triangle[hit]]
-    chance = return_chance(model, distance, reflected).astype(np.float32)
-    nobody = np.zeros(users, dtype=np.int64)
-    return Scan(distance, distance, intensity, chance, instance, nobody, nobody)
-
-
-def differing(one: Scan, other: Scan) -> Integer:
-    """Return the rays that do not end at the same distance on the same object."""
-    hit, there = np.isfinite(one.distance), np.isfinite(other.distance)
-    both = hit & there
-    apart = hit != there
-    apart[both] = np.abs(one.distance[both] - other.distance[both]) > SLACK
-    return np.flatnonzero(apart | (one.instance != other.instance))
-
-
-def grazes(origin: Float, direction: Float, triangles: Float, distance: float) -> bool:
-    """Return whether a ray grazes an edge or a surface, so that two engines may disagree on it.
-
-    It passes an edge, or it hits a surface so edge-on that the single precision of the
-    corners moves the full scan's return, while double precision agrees with this one.
-    """
-    return (
-        passes_an_edge(origin, direction, triangles) or abs(exact_hit(origin, direction, triangles) - distance) < SLACK
-    )
-
-
-def exact_hit(origin: Float, direction: Float, triangles: Float) -> float:
-    """Return the distance to the first triangle in double precision (Möller and Trumbore 1997), or infinity."""
-    start, first, second = triangles[:, 0], triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
-    across = np.cross(direction, second)
-    volume = (first * across).sum(axis=1)
-    facing = np.flatnonzero(volume)
-    away, share = origin - start[facing], 1.0 / volume[facing]
-    along = np.cross(away, first[facing])
-    u, v = share * (away * across[facing]).sum(axis=1), share * (along @ direction)
-    far = share * (second[facing] * along).sum(axis=1)
-    return float(far[(u >= 0) & (v >= 0) & (u + v <= 1) & (far > 0)].min(initial=np.inf))
-
-
-def passes_an_edge(origin: Float, direction: Float, triangles: Float) -> bool:
-    """Return whether a ray passes within a tenth of a millimetre of a triangle's edge."""
-    start = np.concatenate([triangles[:, corner] for corner in range(3)]) - origin
-    edge = np.concatenate([triangles[:, (corner + 1) % 3] - triangles[:, corner] for corner in range(3)])
-    aside, across = (part - np.outer(part @ direction, direction) for part in (start, edge))
-    length = np.maximum((across**2).sum(axis=1), np.finfo(float).tiny)
-    share = np.clip(-(aside * across).sum(axis=1) / length, 0, 1)
-    return bool(np.linalg.norm(aside + share[:, None] * across, axis=1).min() < SLACK)

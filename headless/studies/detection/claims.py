@@ -1,4 +1,4 @@
-"""Verdicts on the paper's claims about detection, 5 to 9, for one site.
+"""Verdicts on the paper's claims about detection, 5 to 8, for one site.
 
 Gains are in points of average precision. All figures are means over the seeds of the training with Student's 95 %
 interval; seeds are compared in pairs. A claim holds if the interval lies within the claimed range, does not hold if it
@@ -15,6 +15,7 @@ from headless.studies.mean_over_seeds import ANYTHING, CHANGE_OF_SHARE, COUNT, m
 
 import numpy as np
 
+from seip_addon.core.arrays import Float
 from seip_addon.core.counts import counted
 from seip_addon.core.estimates import SHARE, Interval
 
@@ -47,8 +48,6 @@ class SeedResult:
         False positives per frame, at a score that all results of a training share.
     sparse : float, 0 to 1
         Share of the false positives where the cloud is sparser than around half of the hits; NaN without any.
-    padded : bool
-        Whether empty slots of pillars were fed to the network as points instead of masked: the ablation of claim 9.
     still_rising : bool
         Whether the average precision on validation frames was still rising when the training ended.
     """
@@ -61,32 +60,28 @@ class SeedResult:
     coverage: float
     false_positives: float
     sparse: float
-    padded: bool = False
     still_rising: bool = False
 
 
 def detection_claims(results: Sequence[SeedResult]) -> tuple[Claim, ...]:
-    """Evaluate claims 5 to 9 of the paper on the measurements.
+    """Evaluate claims 5 to 8 of the paper on the measurements.
 
-    Claims for which a type or the ablation is missing are left out.
+    Claims for which a type is missing are left out.
 
     Parameters
     ----------
     results : sequence of SeedResult
-        Results with several seeds for each type; types in order from the simplest to the best.
+        Results of every seed for each type and number of sensors; types in order from the simplest to the best.
     """
-    masked = [result for result in results if not result.padded]
-    sensors = list(dict.fromkeys(result.sensor for result in masked))
+    sensors = list(dict.fromkeys(result.sensor for result in results))
     claims = [
-        _decided(_gains(number, masked, sensor, published), _of(masked, sensor))
+        _decided(_gains(number, results, sensor, published), _of(results, sensor))
         for number, sensor, published in zip((5, 6), sensors, PUBLISHED_GAINS, strict=False)  # a study may have one
     ]
     if len(sensors) > 1:
-        claims.append(_decided(_simple_sensors_gain_more(masked, sensors), masked))
+        claims.append(_decided(_simple_sensors_gain_more(results, sensors), results))
     if sensors:
-        claims.append(_decided(_false_where_sparse(masked, sensors[0]), _of(masked, sensors[0])))
-    if len(masked) < len(results):
-        claims.append(_decided(_padding(results), results))
+        claims.append(_decided(_false_where_sparse(results, sensors[0]), _of(results, sensors[0])))
     return tuple(claims)
 
 
@@ -103,96 +98,100 @@ def _decided(claim: Claim, results: Sequence[SeedResult]) -> Claim:
 
 
 def _doubts(results: Sequence[SeedResult]) -> Iterator[str]:
-    masked = [one for one in results if not one.padded]
-    cells = {(one.sensor, one.count) for one in masked}
-    reached = (_mean(_by_seed(masked, *cell, lambda one: one.average_precision)).value for cell in cells)
-    best = max(reached, default=0.0)
+    cells = {(one.sensor, one.count) for one in results}
+    best = max(float(_figures(results, *cell, "average_precision").mean()) for cell in cells)
     if best < LEAST_PRECISION:
         yield (
             f"the detectors reach an AP of {best:.1%} with the best of these placements, and below "
             f"{LEAST_PRECISION:.0%} they support no conclusion about sensors"
         )
-    trainings = {(one.seed, one.padded) for one in results}
-    rising = {(one.seed, one.padded) for one in results if one.still_rising}
+    rising = {one.seed for one in results if one.still_rising}
     if rising:
         yield (
-            f"validation AP was still rising when {len(rising)} of {len(trainings)} trainings ended: train longer, "
-            "with --steps"
+            f"validation AP was still rising when {len(rising)} of {len({one.seed for one in results})} trainings "
+            "ended: train longer, with --steps"
         )
 
 
 def _gains(number: int, results: Sequence[SeedResult], sensor: str, published: tuple[float, float]) -> Claim:
     steps = ((FEW, SOME), (SOME, MANY))
-    gains = [_mean(_gain(results, sensor, *step), CHANGE_OF_SHARE) for step in steps]
-    verdicts = [_about(gain, expected) for gain, expected in zip(gains, published, strict=True)]
+    gains = [_Mean.of(_gain(results, sensor, *step), CHANGE_OF_SHARE) for step in steps]
+    verdicts = [gain.about(expected) for gain, expected in zip(gains, published, strict=True)]
     figures = [f"{a} to {b}: {gain.points()}" for (a, b), gain in zip(steps, gains, strict=True)]
     return Claim(
         number,
         f"{sensor}: AP rises by about {100 * published[0]:g} points from N = {FEW} to {SOME} and by about "
         f"{100 * published[1]:g} from {SOME} to {MANY}",
         worst_verdict(verdicts),
-        f"{'; '.join(figures)}; {_seeds(gains)}",
+        f"{'; '.join(figures)}; {counted(len(_gain(results, sensor, FEW, SOME)), 'seed')}",
     )
 
 
 def _simple_sensors_gain_more(results: Sequence[SeedResult], sensors: Sequence[str]) -> Claim:
     simple, *better = sensors
     gains = {sensor: _gain(results, sensor, FEW, MANY) for sensor in sensors}
-    leads = [_mean(_differences(gains[simple], gains[other])) for other in better]
-    rows = [
-        f"{sensor} {_mean(gains[sensor], CHANGE_OF_SHARE).points()}{_per_price(results, sensor)}" for sensor in sensors
-    ]
+    leads = [_Mean.of(gains[simple] - gains[other]) for other in better]
+    rows = []
+    for sensor, gain in gains.items():
+        spent = (_figures(results, sensor, MANY, "price")[0] - _figures(results, sensor, FEW, "price")[0]) / 1000
+        per_price = f", {100 * gain.mean() / spent:+.2f} for each $1,000" if spent > 0 else ""
+        rows.append(f"{sensor} {_Mean.of(gain, CHANGE_OF_SHARE).points()}{per_price}")
     ahead = [f"{lead.points()} more than {other}" for other, lead in zip(better, leads, strict=True)]
     return Claim(
         7,
         f"adding {simple} sensors gains more AP than adding {' or '.join(better)}",
-        worst_verdict([_above(lead) for lead in leads]),
+        worst_verdict([lead.above() for lead in leads]),
         f"N = {FEW} to {MANY}: {'; '.join(rows)}; {simple} gains {', '.join(ahead)}",
     )
 
 
 def _false_where_sparse(results: Sequence[SeedResult], sensor: str) -> Claim:
-    false = {count: _by_seed(results, sensor, count, lambda result: result.false_positives) for count in COUNTS}
-    more = [_mean(_differences(false[count], false[MANY])) for count in (FEW, SOME)]
-    sparse = [_mean(_by_seed(results, sensor, count, lambda result: result.sparse), SHARE) for count in (FEW, SOME)]
-    rows = [f"N = {count} {_mean(false[count], COUNT).plain()}" for count in COUNTS]
+    false = {count: _figures(results, sensor, count, "false_positives") for count in COUNTS}
+    more = [_Mean.of(false[count] - false[MANY]) for count in (FEW, SOME)]
+    sparse = [_Mean.of(_figures(results, sensor, count, "sparse"), SHARE) for count in (FEW, SOME)]
+    rows = [f"N = {count} {_Mean.of(false[count], COUNT).plain()}" for count in COUNTS]
     shares = [f"N = {count} {share.share()}" for count, share in zip((FEW, SOME), sparse, strict=True)]
     return Claim(
         8,
         f"{sensor}: N = {FEW} and {SOME} give more false positives than N = {MANY}, mostly where the cloud is sparse",
-        worst_verdict([*map(_above, more), *(_above(share, 0.5) for share in sparse)]),
+        worst_verdict([*(one.above() for one in more), *(share.above(0.5) for share in sparse)]),
         f"per frame: {'; '.join(rows)}; of them in the sparser half: {'; '.join(shares)}",
     )
 
 
-def _padding(results: Sequence[SeedResult]) -> Claim:
-    cells = dict.fromkeys((result.sensor, result.count) for result in results if result.padded)
-    rows, verdicts = [], []
-    for sensor, count in cells:
-        padded, masked = (
-            _by_seed([result for result in results if result.padded == which], sensor, count, _sparse_false_positives)
-            for which in (True, False)
-        )
-        more = _mean(_differences(padded, masked))
-        verdicts.append(_above(more))
-        rows.append(
-            f"{sensor}, N = {count}: {_mean(padded, COUNT).plain()} padded, {_mean(masked, COUNT).plain()} masked"
-        )
-    return Claim(
-        9,
-        "zero-padded pillars cause false positives where the cloud is sparse",
-        worst_verdict(verdicts),
-        f"false positives per frame in the sparser half: {'; '.join(rows)}",
-    )
+def _figures(results: Sequence[SeedResult], sensor: str, count: int, figure: str) -> Float:
+    """Return a figure of one type and number of sensors for each seed, (s,)."""
+    cell = sorted((one for one in results if (one.sensor, one.count) == (sensor, count)), key=lambda one: one.seed)
+    return np.array([getattr(one, figure) for one in cell])
+
+
+def _gain(results: Sequence[SeedResult], sensor: str, few: int, more: int) -> Float:
+    before, after = (_figures(results, sensor, count, "average_precision") for count in (few, more))
+    return after - before
 
 
 @dataclass(frozen=True)
 class _Mean:
-    """Mean over seeds; its interval is None with fewer than `MIN_SEEDS`."""
+    """Mean over seeds; NaN without any, and with fewer than `MIN_SEEDS` the interval is None."""
 
     value: float
-    seeds: int
     interval: Interval | None
+
+    @classmethod
+    def of(cls, values: Float, possible: Interval = ANYTHING) -> "_Mean":
+        """Return the mean of the known values."""
+        known = values[~np.isnan(values)].tolist()
+        interval = mean_interval(known, possible) if len(known) >= MIN_SEEDS else None
+        return cls(float(np.mean(known)) if known else np.nan, interval)
+
+    def about(self, expected: float) -> str:
+        """Return the verdict on the claim that the mean is about a published figure."""
+        low, high = expected / FACTOR, expected * FACTOR
+        return UNDECIDED if self.interval is None else verdict_within(self.interval, low, high)
+
+    def above(self, least: float = 0.0) -> str:
+        """Return the verdict on the claim that the mean is above a value."""
+        return UNDECIDED if self.interval is None else verdict_above(self.interval, least)
 
     def points(self) -> str:
         return self._written(lambda value: f"{100 * value:+.1f}", " points")
@@ -204,59 +203,7 @@ class _Mean:
         return self._written(lambda value: f"{value:.2f}", "")
 
     def _written(self, figure: Callable[[float], str], unit: str) -> str:
-        if not self.seeds:
+        if np.isnan(self.value):
             return "not measured"
         between = "" if self.interval is None else f" ({figure(self.interval[0])} to {figure(self.interval[1])})"
         return f"{figure(self.value)}{unit}{between}"
-
-
-BySeed = dict[int, float]
-
-
-def _mean(of: BySeed, possible: Interval = ANYTHING) -> _Mean:
-    values = list(of.values())
-    if not values:
-        return _Mean(np.nan, 0, None)
-    interval = mean_interval(values, possible) if len(values) >= MIN_SEEDS else None
-    return _Mean(float(np.mean(values)), len(values), interval)
-
-
-def _by_seed(results: Sequence[SeedResult], sensor: str, count: int, figure: Callable[[SeedResult], float]) -> BySeed:
-    """Return a figure of one cell by seed, without seeds for which it is NaN."""
-    cell = {result.seed: figure(result) for result in results if (result.sensor, result.count) == (sensor, count)}
-    return {seed: value for seed, value in cell.items() if not np.isnan(value)}
-
-
-def _gain(results: Sequence[SeedResult], sensor: str, few: int, more: int) -> BySeed:
-    before, after = (_by_seed(results, sensor, n, lambda result: result.average_precision) for n in (few, more))
-    return _differences(after, before)
-
-
-def _differences(more: BySeed, less: BySeed) -> BySeed:
-    return {seed: more[seed] - less[seed] for seed in more if seed in less}
-
-
-def _sparse_false_positives(result: SeedResult) -> float:
-    return result.false_positives * result.sparse if result.false_positives else 0.0
-
-
-def _per_price(results: Sequence[SeedResult], sensor: str) -> str:
-    """Return the gain for each thousand dollars of price of the added sensors, as a message."""
-    price = {count: _mean(_by_seed(results, sensor, count, lambda result: result.price)).value for count in (FEW, MANY)}
-    spent = (price[MANY] - price[FEW]) / 1000
-    if not spent > 0:
-        return ""
-    return f", {100 * _mean(_gain(results, sensor, FEW, MANY)).value / spent:+.2f} for each $1,000"
-
-
-def _seeds(gains: Sequence[_Mean]) -> str:
-    fewest = min(gain.seeds for gain in gains)
-    return counted(fewest, "seed")
-
-
-def _about(mean: _Mean, expected: float) -> str:
-    return UNDECIDED if mean.interval is None else verdict_within(mean.interval, expected / FACTOR, expected * FACTOR)
-
-
-def _above(mean: _Mean, least: float = 0.0) -> str:
-    return UNDECIDED if mean.interval is None else verdict_above(mean.interval, least)

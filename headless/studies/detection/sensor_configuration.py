@@ -13,22 +13,20 @@ from seip_addon.core.sensing.scans.sensor import MountedSensor
 
 @dataclass(frozen=True, eq=False)
 class SensorConfiguration(MountedSensors):
-    """Sensors of a placement, optimised by the study or read from a folder.
+    """Sensors of a placement that a study optimised.
 
     Parameters
     ----------
     sensors : tuple of MountedSensor
         Sensors of the deployment.
     sensor : str
-        Group in charts and tables: the type, or the name of a placement that was read.
+        Type, by which charts and tables group it.
     count : int
         N, the requested number of sensors.
     status : str
         Status as in `Placement`.
     gap : float
         Optimality gap; infinite without a bound.
-    read : bool
-        Whether it was read from a folder; such a placement may mix types.
     """
 
     sensors: tuple[MountedSensor, ...] = field(init=False)
@@ -37,7 +35,6 @@ class SensorConfiguration(MountedSensors):
     count: int
     status: str
     gap: float
-    read: bool = False
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "sensors", self.deployment.sensors)

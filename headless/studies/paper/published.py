@@ -1,4 +1,4 @@
-"""Published claims, sensors and figures of the paper.
+"""Published claims and figures of the paper.
 
 Qu, Huang and Suo, "SEIP: Simulation-based Design and Evaluation of Infrastructure-based Collective Perception", 2023.
 Its plots are pictures without values.
@@ -44,25 +44,6 @@ PUBLISHED_CLAIMS = (
 )
 
 
-@dataclass(frozen=True)
-class PublishedSensor:
-    """A sensor type of the paper's table of LiDARs (section V): degrees, metres, hertz, and thousands of dollars."""
-
-    key: str
-    channels: int
-    elevations: tuple[float, float]
-    max_range: float
-    rotation_rate: float
-    points_per_second: float
-    price: tuple[float, float]
-
-
-PUBLISHED_SENSORS = (
-    PublishedSensor("type1", 16, (-15.0, 15.0), 100.0, 5.0, 0.3e6, (4.0, 8.0)),
-    PublishedSensor("type2", 32, (-25.0, 15.0), 200.0, 5.0, 1.2e6, (10.0, 20.0)),
-    PublishedSensor("type3", 128, (-25.0, 15.0), 300.0, 5.0, 4.8e6, (70.0, 90.0)),
-)
-
 PUBLISHED_GAINS = {"type1": ("about 20 %", "7 %"), "type2": ("10 %", "5 %")}
 """Gains of average precision from one to two and from two to four sensors (V-C); the text gives none for type 3."""
 
@@ -70,7 +51,7 @@ HEIGHTS = (3.5, 5.4, 8.0)  # metres, section V-A
 
 DIFFERENCES = (
     ("Scene", "CARLA's Town05 with its buildings, trees and furniture, meshes of Unreal Engine", "{scene}"),
-    ("LiDAR", "CARLA's; the types of the table", "the same types; drop-off as CARLA's, beams evenly spaced"),
+    ("LiDAR", "CARLA's; its types 1 to 3", "the same types; drop-off as CARLA's, beams evenly spaced"),
     (
         "Seen",
         "a return within δ of the target; δ, grid and spacing of candidates are not given",

@@ -1,8 +1,8 @@
-"""Demand of a user's route file for SUMO: its flows, drawn randomly for each run or as in the file."""
+"""Demand of a user's route file for SUMO: its flows, drawn randomly for each run."""
 
 import math
 import os
-from collections.abc import Generator, Iterator, Sequence
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from xml.sax.saxutils import quoteattr
@@ -158,31 +158,23 @@ def _number(text: str) -> float:
         return math.nan
 
 
-def write_run(
-    path: str | os.PathLike[str], demand: RouteDemand, seed: int, duration: float, *, fixed: bool = False
-) -> None:
+def write_run(path: str | os.PathLike[str], demand: RouteDemand, seed: int, duration: float) -> None:
     """Write a route file of single vehicles from 0 to ``duration`` seconds; the same for the same seed.
 
     Departures are a Poisson process of the demand's rate. Each vehicle is assigned to a flow with a probability
     proportional to the flow's rate. Lane, model and stopping gaps are random unless the files give them. The seed is
     part of all names because the paint of a road user depends on its name.
-
-    Parameters
-    ----------
-    fixed : bool
-        Whether everything is as in the file, for all seeds: each flow departs at even intervals from 0 on, lanes and
-        gaps are SUMO's, and the models are the same in all runs.
     """
-    random = np.random.default_rng([0 if fixed else seed, 4])
-    drawn = _even(demand, duration) if fixed else _drawn(demand, duration, random)
+    random = np.random.default_rng([seed, 4])
+    shares = np.array([flow.rate for flow in demand.flows]) / demand.rate
     lines = ["<routes>"]
-    for number, (depart, flow) in enumerate(drawn):
-        name = f"{flow.name}{'' if fixed else seed}.{number}"
+    for number, depart in enumerate(poisson_departures(demand.rate, random, duration)):
+        flow = demand.flows[int(random.choice(len(shares), p=shares))]
+        name = f"{flow.name}{seed}.{number}"
         model = flow.type or (str(random.choice(demand.models)) if demand.models else "")
-        gaps = {} if fixed else {"minGap": _between(random, MIN_GAP), "jmStoplineGap": _between(random, STOP_LINE_GAP)}
-        lanes = {} if fixed else {"departLane": "random"}
+        gaps = {"minGap": _between(random, MIN_GAP), "jmStoplineGap": _between(random, STOP_LINE_GAP)}
         lines.append(_element("vType", gaps | demand.types.get(model, {}) | {"id": name}))
-        vehicle = {"id": name, "type": name, "depart": f"{depart:.1f}"} | lanes | dict(flow.departure)
+        vehicle = {"id": name, "type": name, "depart": f"{depart:.1f}", "departLane": "random"} | dict(flow.departure)
         route = _element("route", {"edges": " ".join(flow.edges)})
         lines.append(f"{_element('vehicle', vehicle)[:-2]}>{route}</vehicle>")
     with whole_file(path) as temporary:
@@ -191,17 +183,6 @@ def write_run(
 
 def _between(random: np.random.Generator, span: tuple[float, float]) -> str:
     return f"{random.uniform(*span):.2f}"
-
-
-def _drawn(demand: RouteDemand, duration: float, random: np.random.Generator) -> Iterator[tuple[float, Flow]]:
-    shares = np.array([flow.rate for flow in demand.flows]) / demand.rate
-    for depart in poisson_departures(demand.rate, random, duration):
-        yield depart, demand.flows[int(random.choice(len(shares), p=shares))]
-
-
-def _even(demand: RouteDemand, duration: float) -> list[tuple[float, Flow]]:
-    times = [(float(depart), flow) for flow in demand.flows for depart in np.arange(0.0, duration, 3600.0 / flow.rate)]
-    return sorted(times, key=lambda one: one[0])
 
 
 def _element(tag: str, attributes: Attributes) -> str:

@@ -1,7 +1,5 @@
-"""Runs of traffic with the demand of a user's route file: drawn randomly for each, or with fixed departures."""
+"""Runs of traffic with the demand of a user's route file, drawn randomly for each."""
 
-import json
-import math
 from collections.abc import Generator, Sequence
 from dataclasses import dataclass
 from itertools import combinations, pairwise
@@ -19,8 +17,6 @@ from seip_addon.core.sensing.traffic.run_overlap import VehiclePositions, overla
 from seip_addon.core.sensing.traffic.source import TrafficFiles, read_net_offset
 from seip_addon.core.sensing.traffic.trajectories import Trajectories
 from seip_addon.core.site.scene_geometry import SceneGeometry, joined
-from seip_addon.core.storage.files import digest, save_json
-from seip_addon.core.storage.source_digest import source_digest
 from seip_addon.core.sumo_programs import find_sumo
 from seip_addon.core.workflows.traffic_runs import traffic_folder
 from seip_addon.core.world.traffic_simulation.simulation import run_sumo
@@ -28,6 +24,7 @@ from seip_addon.core.world.traffic_simulation.street_network import DRIVING, Str
 from seip_addon.core.world.traffic_simulation.traffic_run import recorded_run
 
 MIN_ON_ROAD = 0.8  # least share of a network's lanes in the region on the scene's road, for a network of its map
+WARM_UP = 120.0  # seconds before a run begins
 SIGNAL_CYCLE = 120  # seconds; the start of a drawn run is random within it, so that the phases of signals differ
 MOST_OVERLAP = 0.16
 """Largest overlap of a drawn run with an earlier one: the largest of any two runs at the shipped junction."""
@@ -46,45 +43,10 @@ class TrafficSource:
     network: Path
 
 
-@dataclass(frozen=True)
-class RunSettings:
-    """Settings of the runs of traffic: number, duration and warm-up (seconds), and seed."""
-
-    runs: int = 16
-    duration: float = 40.0
-    warm_up: float = 120.0
-    seed: int = 0
-
-    def __post_init__(self) -> None:
-        if not 4 <= self.runs <= 999:
-            raise SeipError(f"--runs must be 4 to 999 runs of traffic, not {self.runs}")
-        if not 3.0 <= self.duration <= 3600.0 or not 0.0 <= self.warm_up <= 3600.0:
-            raise SeipError("a run lasts 3 to 3600 s (--duration), after a warm-up of 0 to 3600 s (--warm-up)")
-        if not 0 <= self.seed < 10**4:
-            raise SeipError(f"--seed must be a whole number from 0 to 9999, not {self.seed}")
-
-
-@dataclass(frozen=True, eq=False)
-class SiteTraffic:
-    """Demand that goes through a site.
-
-    Parameters
-    ----------
-    demand : RouteDemand
-        All flows of the file.
-    through : float, vehicles per hour
-        Rate of the flows that cross the region from one of its streets to another.
-    """
-
-    source: TrafficSource
-    demand: RouteDemand
-    through: float
-
-
-def read_traffic_of_site(
+def read_demand_of_site(
     source: TrafficSource, geometry: SceneGeometry, map_name: str
-) -> Generator[Progress, None, SiteTraffic]:
-    """Read the demand, and check that it is of this place.
+) -> Generator[Progress, None, RouteDemand]:
+    """Read the demand, and check that it is of this site.
 
     Raises
     ------
@@ -109,13 +71,12 @@ def read_traffic_of_site(
                 f"{source.routes.name}: flow {flow.name!r} takes the edge {unknown[0]!r}, which "
                 f"{source.network.name} does not have: name the network that the routes were made for"
             )
-    through = [flow.rate for flow in demand.flows if _crosses(flow.edges, network, geometry, shift)]
-    if not through:
+    if not any(_crosses(flow.edges, network, geometry, shift) for flow in demand.flows):
         raise SeipError(
             f"no flow of {source.routes.name} goes through the region of {geometry.name}: name routes through its "
             "junction, or another --junction"
         )
-    return SiteTraffic(source, demand, sum(through))
+    return demand
 
 
 def _share_on_road(network: StreetNetwork, geometry: SceneGeometry, shift: Float) -> float | None:
@@ -138,15 +99,19 @@ def _crosses(edges: Sequence[str], network: StreetNetwork, geometry: SceneGeomet
     return any(shapely.contains_xy(geometry.region, *end) for end in ends)
 
 
-def make_runs(
-    scene: Path, traffic: SiteTraffic, geometry: SceneGeometry, settings: RunSettings, *, fixed: bool
+def make_runs(  # inputs and sizes of the runs
+    scene: Path, source: TrafficSource, demand: RouteDemand, geometry: SceneGeometry, runs: int, duration: float
 ) -> Generator[Progress, None, list[Path]]:
-    """Simulate runs into the folder next to a scene's file, unless runs with the same inputs are already there.
+    """Simulate runs into the folder next to a scene's file.
+
+    A run is simulated again with other seeds while it overlaps an earlier one by more than `MOST_OVERLAP`.
 
     Parameters
     ----------
-    fixed : bool
-        As in `write_run`: departures, routes and models are those of the file, and only SUMO's seed differs.
+    runs : int
+        Number of runs.
+    duration : float, seconds
+        Duration of each run.
 
     Returns
     -------
@@ -158,70 +123,38 @@ def make_runs(
     SeipError
         SUMO is missing or rejects its input, or there are no road users on the road.
     """
-    folder = traffic_folder(scene, "_fixed" if fixed else "")
-    source, record = traffic.source, folder / "runs.json"
-    files = [path.read_bytes() for path in (source.routes, *source.types, source.network)]
-    key = digest(repr(settings), str(fixed), *files, geometry.origin, joined(geometry.roads), source_digest(__name__))
-    paths = [folder / f"run-{number}.npz" for number in range(1, settings.runs + 1)]
-    if _key_of(record) == key and all(path.is_file() for path in paths):
-        return paths
+    folder = traffic_folder(scene)
     folder.mkdir(parents=True, exist_ok=True)
-    record.unlink(missing_ok=True)
-    made: list[VehiclePositions] = []
+    earlier: list[VehiclePositions] = []
+    paths = [folder / f"run-{number}.npz" for number in range(1, runs + 1)]
     for number, path in enumerate(paths, start=1):
-        steps = _independent(folder, traffic, geometry, settings, number, () if fixed else made, fixed=fixed)
-        trajectories = yield from within(Progress(number - 1, settings.runs, f"run {number}"), steps)
-        trajectories.save(path)
-        made.append(vehicle_positions(path.stem, trajectories))
-    save_json(record, {"key": key})
+        progress = Progress(number - 1, runs, f"run {number}")
+        drawn: list[tuple[float, int, Trajectories, VehiclePositions]] = []
+        for draw in range(MAX_DRAWS):
+            seed = MAX_DRAWS * number + draw
+            run = yield from within(progress, _simulated(folder, source, demand, geometry, seed, duration))
+            own = vehicle_positions(path.stem, run)
+            overlap = max((overlap_of(own, other) or 0.0 for other in earlier), default=0.0)
+            drawn.append((overlap, draw, run, own))
+            if overlap <= MOST_OVERLAP:
+                break
+        *_, run, own = min(drawn)
+        run.save(path)
+        earlier.append(own)
     return paths
 
 
-def _key_of(record: Path) -> str | None:
-    try:
-        return str(json.loads(record.read_text(encoding="utf-8"))["key"])
-    except (OSError, ValueError, LookupError, TypeError):
-        return None
-
-
-def _independent(  # noqa: PLR0913  # inputs of a run, and the runs that it must not repeat
-    folder: Path,
-    traffic: SiteTraffic,
-    geometry: SceneGeometry,
-    settings: RunSettings,
-    number: int,
-    others: Sequence[VehiclePositions],
-    *,
-    fixed: bool,
+def _simulated(  # as above
+    folder: Path, source: TrafficSource, demand: RouteDemand, geometry: SceneGeometry, seed: int, duration: float
 ) -> Generator[Progress, None, Trajectories]:
-    """Simulate a run, again with other seeds while it overlaps others by more than `MOST_OVERLAP`."""
-    least, best = math.inf, None
-    for draw in range(MAX_DRAWS):
-        seed = MAX_DRAWS * (1000 * settings.seed + number) + draw
-        run = yield from _simulated(folder, traffic, geometry, settings, seed, fixed=fixed)
-        own = vehicle_positions(f"run {number}", run)
-        most = max((overlap_of(own, other) or 0.0 for other in others), default=0.0)
-        if best is None or most < least:
-            least, best = most, run
-        if least <= MOST_OVERLAP:
-            break
-    assert best is not None  # noqa: S101  # one was drawn at least
-    return best
-
-
-def _simulated(
-    folder: Path, traffic: SiteTraffic, geometry: SceneGeometry, settings: RunSettings, seed: int, *, fixed: bool
-) -> Generator[Progress, None, Trajectories]:
-    begin = settings.warm_up
-    if not fixed:
-        begin += float(np.random.default_rng([seed, 5]).integers(SIGNAL_CYCLE))
-    end = begin + settings.duration
+    begin = WARM_UP + float(np.random.default_rng([seed, 5]).integers(SIGNAL_CYCLE))
+    end = begin + duration
     routes, recorded = folder / "run.rou.xml", folder / "run.fcd.xml"
-    files = TrafficFiles(recorded, (routes,), traffic.source.network)
+    files = TrafficFiles(recorded, (routes,), source.network)
     try:
-        write_run(routes, traffic.demand, seed, end, fixed=fixed)
+        write_run(routes, demand, seed, end)
         yield from run_sumo(find_sumo(), files, seed, end)
-        origin = f"SUMO, demand of {traffic.source.routes.name}, {'fixed departures, ' if fixed else ''}seed {seed}"
+        origin = f"SUMO, demand of {source.routes.name}, seed {seed}"
         run = yield from recorded_run(files, (begin, end), geometry, origin)
     finally:
         for path in (routes, recorded):

@@ -39,46 +39,33 @@ FIRST_BAY = (18.0, 40.0)  # metres from the junction
 
 
 @dataclass(frozen=True)
-class KerbParking:
-    """Rows of parked cars at kerbs; see `rows_at_kerbs`.
-
-    Parameters
-    ----------
-    bays : int
-        Number of bays in a row.
-    occupied : float
-        Share of the bays with a car.
-    streets : float
-        Share of the streets with room for a row that have one.
-    first : float, metres
-        Distance from the start of the street to the first bay.
-    """
-
-    bays: int = 3
-    occupied: float = 1.0
-    streets: float = 0.5
-    first: float = 35.0
-
-
-@dataclass(frozen=True)
 class DrawnDemand(Demand):
     """Demand with given parking at kerbs, in which each road user has its own size.
 
-    Sizes are drawn as in `varied_bodies`, instead of taken from a model.
+    Sizes are drawn as in `varied_bodies`, instead of taken from a model. Rows of parked cars at kerbs (`rows_at_kerbs`)
+    are used if no street has parking lanes.
 
     Parameters
     ----------
-    kerb : KerbParking
-        Parking at kerbs, used if no street has parking lanes.
+    row_bays : int
+        Number of bays in a row.
+    occupied : float
+        Share of the bays with a car.
+    row_streets : float
+        Share of the streets with room for a row that have one.
+    first_bay : float, metres
+        Distance from the start of the street to the first bay.
     """
 
-    kerb: KerbParking = KerbParking()
+    row_bays: int = 3
+    occupied: float = 1.0
+    row_streets: float = 0.5
+    first_bay: float = 35.0
 
     def kerb_bays(self, network: StreetNetwork, seed: int, random: Random) -> Iterator[Bay]:
         """Yield the bays with parked cars at kerbs."""
-        kerb = self.kerb
-        for bay in rows_at_kerbs(network, seed, kerb.streets, kerb.bays, kerb.first):
-            if kerb.occupied >= 1.0 or random.random() < kerb.occupied:
+        for bay in rows_at_kerbs(network, seed, self.row_streets, self.row_bays, self.first_bay):
+            if self.occupied >= 1.0 or random.random() < self.occupied:
                 yield bay
 
     def own_types(self, departures: Sequence[Departure], seed: int) -> dict[str, str]:
@@ -112,12 +99,10 @@ def draw_demand(plan: StreetPlan, random: Random) -> DrawnDemand:
         turns=tuple(random.dirichlet([4.0, 10.0, 4.0]).round(3).tolist()),
         pedestrians=round(float(random.uniform(*PEDESTRIANS)), 0),
         shares={name: round(share / sum(least.values()), 4) for name, share in least.items()},
-        kerb=KerbParking(
-            bays=int(random.integers(*BAYS)),
-            occupied=round(float(random.uniform(0.5, 1.0)), 2),
-            streets=round(float(random.uniform(0.5, 1.0)), 2),
-            first=round(float(random.uniform(*FIRST_BAY)), 1),
-        ),
+        row_bays=int(random.integers(*BAYS)),
+        occupied=round(float(random.uniform(0.5, 1.0)), 2),
+        row_streets=round(float(random.uniform(0.5, 1.0)), 2),
+        first_bay=round(float(random.uniform(*FIRST_BAY)), 1),
     )
 
 

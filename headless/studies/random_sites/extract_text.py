@@ -21,15 +21,9 @@ _WGS84 = 4326
 _STRAIGHT_ENTRY = 15.0  # metres that a street runs straight into a roundabout
 
 
-def write_extract(path: Path, plan: StreetPlan, middle: tuple[float, float] = (LATITUDE, LONGITUDE)) -> None:
-    """Write the plan as an extract.
-
-    Parameters
-    ----------
-    middle : (2,) float, degrees
-        Latitude and longitude of the plan's middle.
-    """
-    text = _Extract(middle)
+def write_extract(path: Path, plan: StreetPlan) -> None:
+    """Write the plan as an extract."""
+    text = _Extract()
     _add_streets(text, plan)
     for thing in plan.things:
         if len(thing.corners) == 1:
@@ -58,25 +52,24 @@ def write_terrain(path: Path, plan: StreetPlan) -> None:
         Image.fromarray(heights.astype(np.float32)).save(temporary, format="TIFF", tiffinfo=tags)
 
 
-def _degrees(place: Float, latitude: float = LATITUDE) -> tuple[float, float]:
+def _degrees(place: Float) -> tuple[float, float]:
     """Convert metres east and north of the middle to degrees of longitude and latitude."""
     degree = math.radians(1.0) * EARTH_RADIUS
-    return float(place[0]) / (degree * math.cos(math.radians(latitude))), float(place[1]) / degree
+    return float(place[0]) / (degree * math.cos(math.radians(LATITUDE))), float(place[1]) / degree
 
 
 class _Extract:
     """Nodes and ways of an extract that is being written."""
 
-    def __init__(self, middle: tuple[float, float]) -> None:
-        self._latitude, self._longitude = middle
+    def __init__(self) -> None:
         self._nodes: list[str] = []
         self._ways: list[str] = []
 
     def node(self, place: Float, tags: Tags | None = None) -> int:
         number = len(self._nodes) + 1
-        east, north = _degrees(place, self._latitude)
+        east, north = _degrees(place)
         body = "".join(_tag_lines(tags or {}))
-        latitude, longitude = self._latitude + north, self._longitude + east
+        latitude, longitude = LATITUDE + north, LONGITUDE + east
         self._nodes.append(f'<node id="{number}" lat="{latitude:.8f}" lon="{longitude:.8f}">{body}</node>')
         return number
 

@@ -1,11 +1,9 @@
 """Generation of training sites: scene, map and runs of traffic from a seed."""
 
 import json
-import math
-from collections.abc import Generator, Mapping, Sequence
+from collections.abc import Generator, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import bpy
 import numpy as np
@@ -13,7 +11,6 @@ import numpy as np
 from seip_addon.core.errors import SeipError
 from seip_addon.core.output.results.versions import versions
 from seip_addon.core.progress import Progress, within
-from seip_addon.core.sensing.traffic.source import describe_categories
 from seip_addon.core.site.candidates import PAPER_TYPES, CandidateSettings
 from seip_addon.core.site.check import check_site
 from seip_addon.core.site.scene_geometry import SceneGeometry
@@ -37,7 +34,7 @@ from .extract_text import LATITUDE, LONGITUDE, write_extract, write_terrain
 from .street_plan import StreetPlan, draw_plan, with_tram
 from .varied_bodies import shaped
 
-SCHEMA, VERSION = "seip.training_site", 1
+SCHEMA, VERSION = "seip.training_site", 2
 MAX_ATTEMPTS = 8  # plans that are drawn for a site until one passes the check
 _PLAN, _RUN = 0, 1  # streams of random numbers of a site
 
@@ -81,33 +78,11 @@ class SiteSettings:
             raise SeipError(f"--approaches must be 30 to 100 m, not {self.approaches:g}")
 
 
-@dataclass(frozen=True, eq=False)
-class MadeSite:
-    """A finished site.
-
-    Parameters
-    ----------
-    record : mapping
-        Content of its ``site.json``.
-    kept : bool
-        Whether it already existed.
-    """
-
-    folder: Path
-    record: Mapping[str, Any]
-    kept: bool
-
-
-def site_key(settings: SiteSettings, number: int) -> str:
-    """Return a digest of all inputs of a site."""
-    return digest(repr(settings), number, bpy.app.version_string, source_digest(__name__))
-
-
-def make_site(folder: Path, settings: SiteSettings, number: int) -> Generator[Progress, None, MadeSite]:
-    """Generate a site in a folder, unless a site with the same settings is already there.
+def make_site(folder: Path, settings: SiteSettings, number: int) -> Generator[Progress, None, bool]:
+    """Generate a site in a folder; return whether it was generated, not already there with the same settings.
 
     Its files are ``site.osm``, ``site.tif``, ``site.net.xml``, ``site.blend``, ``site_traffic/run-*.npz`` and, written
-    last, ``site.json``.
+    last, ``site.json`` with the settings.
 
     Raises
     ------
@@ -115,42 +90,28 @@ def make_site(folder: Path, settings: SiteSettings, number: int) -> Generator[Pr
         SUMO is missing, or the folder cannot be written.
     """
     find_sumo()
-    record_path = folder / "site.json"
-    key = site_key(settings, number)
-    kept = _finished(record_path, key, settings)
-    if kept is not None:
-        return MadeSite(folder, kept, kept=True)
-    record_path.unlink(missing_ok=True)
+    record = folder / "site.json"
+    key = digest(repr(settings), number, bpy.app.version_string, source_digest(__name__))
+    runs = [run_path(folder, run) for run in range(1, settings.runs + 1)]
+    files = [folder / "site.blend", folder / "site.net.xml", *runs]
+    if _key_of(record) == key and all(file.is_file() for file in files):
+        return False
+    record.unlink(missing_ok=True)
     plan, geometry, attempt = yield from _built(folder, settings, number)
-    runs = []
     for run in range(1, settings.runs + 1):
         steps = _run_of_traffic(folder, settings, [number, attempt, run], plan, geometry)
-        runs.append((yield from within(Progress(run, settings.runs + 1, f"run {run}"), steps)))
-    record = {
-        "schema": SCHEMA,
-        "version": VERSION,
-        "key": key,
-        "number": number,
-        "settings": asdict(settings),
-        "attempts": attempt + 1,
-        "plan": _plan_record(plan),
-        "runs": runs,
-        "versions": versions(blender=bpy.app.version_string),
-    }
-    save_json(record_path, record)
-    return MadeSite(folder, record, kept=False)
+        yield from within(Progress(run, settings.runs + 1, f"run {run}"), steps)
+    inputs = {"number": number, "settings": asdict(settings), "versions": versions(blender=bpy.app.version_string)}
+    save_json(record, {"schema": SCHEMA, "version": VERSION, "key": key, **inputs})
+    return True
 
 
-def _finished(path: Path, key: str, settings: SiteSettings) -> dict[str, Any] | None:
-    """Return the record of a site that has this key and all of its files, or None."""
+def _key_of(record: Path) -> object:
+    """Return the key in a site's record, or None."""
     try:
-        record = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        return json.loads(record.read_text(encoding="utf-8"))["key"]
+    except (OSError, ValueError, LookupError, TypeError):
         return None
-    runs = [run_path(path.parent, run) for run in range(1, settings.runs + 1)]
-    files = [path.parent / "site.blend", path.parent / "site.net.xml", *runs]
-    there = all(file.is_file() for file in files)
-    return record if there and isinstance(record, dict) and record.get("key") == key else None
 
 
 def run_path(folder: Path, run: int) -> Path:
@@ -211,8 +172,8 @@ def _laid_out(geometry: SceneGeometry) -> tuple[Site, Sequence[str]]:
 
 def _run_of_traffic(
     folder: Path, settings: SiteSettings, streams: Sequence[int], plan: StreetPlan, geometry: SceneGeometry
-) -> Generator[Progress, None, dict[str, Any]]:
-    """Simulate and save a run; return its entry in the record."""
+) -> Generator[Progress, None, None]:
+    """Simulate and save a run."""
     random = np.random.default_rng([settings.seed, *streams, _RUN])
     demand, signals = draw_demand(plan, random), draw_signals(random)
     if settings.pedestrians:
@@ -220,37 +181,4 @@ def _run_of_traffic(
     seed = int(random.integers(2**31))
     scenario = Scenario(demand, signals, seed, settings.warm_up + settings.duration)
     simulated = yield from simulate_run(folder / "site.net.xml", scenario, settings.warm_up, geometry)
-    trajectories = shaped(simulated.trajectories, seed)
-    path = run_path(folder, streams[-1])
-    trajectories.save(path)
-    return {
-        "file": path.relative_to(folder).as_posix(),
-        "demand": asdict(demand),
-        "green_s": signals.green,
-        "seed": seed,
-        "road_users": describe_categories(trajectories),
-        "warnings": list(simulated.warnings),
-    }
-
-
-def _plan_record(plan: StreetPlan) -> dict[str, Any]:
-    return {
-        "roundabout_m": plan.roundabout,
-        "signals": plan.signals,
-        "left_hand": plan.left_hand,
-        "things": len(plan.things),
-        "arms": [
-            {
-                "name": arm.name,
-                "angle_deg": round(math.degrees(arm.angle) % 360.0, 1),
-                "lanes_in": arm.lanes_in,
-                "lanes_out": arm.lanes_out,
-                "lane_width_m": arm.lane_width,
-                "turn_lane": arm.turn_lane,
-                "kerb_lane_m": arm.kerb_lane,
-                "cycle_lanes": arm.cycle_lanes,
-                "slope": round(arm.slope, 4),
-            }
-            for arm in plan.arms
-        ],
-    }
+    shaped(simulated.trajectories, seed).save(run_path(folder, streams[-1]))

@@ -5,15 +5,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from seip_addon.core.arrays import Float
-from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import Progress
 from seip_addon.core.sensing.traffic.overlaps import find_overlaps
 from seip_addon.core.sensing.traffic.trajectories import CATEGORIES, RoadUser, Trajectories
 
 CORRELATION = 0.5  # correlation of any two dimensions of one kind of road user
 REACH = 2.0  # largest distance of a drawn dimension from the mean, in standard deviations
-MAX_CHANGE = 0.5  # largest share by which `resized` changes a dimension
 _HALVINGS = 3  # number of times that a growth which causes an overlap is halved before it is dropped
 
 
@@ -85,25 +82,9 @@ SHAPES: Mapping[str, tuple[float, float, float, float]] = dict.fromkeys(CATEGORI
 """Largest absolute value of each number of a shape; it moves the foot of a car's windscreen by up to 0.2 m."""
 
 
-def varied(trajectories: Trajectories, seed: int) -> Generator[Progress, None, Trajectories]:
-    """Give each road user a size and a shape of its own, drawn from `KINDS` and `SHAPES`.
-
-    A road user that is longer than any kind of its category keeps its size. One that would overlap another grows less,
-    or not at all, so that in dense traffic sizes are somewhat below those of the table.
-
-    Parameters
-    ----------
-    seed : int, 0 or above
-        Seed of the bodies.
-    """
-    random = _generator(seed)
-    drawn = [_size_within_kinds(user, random) for user in trajectories.users]
-    return (yield from with_sizes(shaped(trajectories, seed), np.array(drawn)))
-
-
 def shaped(trajectories: Trajectories, seed: int) -> Trajectories:
     """Give each road user a shape of its own, without changing its size."""
-    random = _generator(seed, 1)
+    random = np.random.default_rng([seed, _STREAM, 1])
     return replace(
         trajectories,
         users=tuple(replace(user, shape=draw_shape(user.category, random)) for user in trajectories.users),
@@ -113,50 +94,27 @@ def shaped(trajectories: Trajectories, seed: int) -> Trajectories:
 def resized(trajectories: Trajectories, change: float, seed: int) -> Generator[Progress, None, Trajectories]:
     """Multiply each dimension of each road user by a factor of its own, uniform from 1 − ``change`` to 1 + ``change``.
 
-    A road user that would overlap another grows less. With the same seed, a larger change modifies each dimension in
-    the same direction, and more. Different traffic has different factors.
-
-    Raises
-    ------
-    SeipError
-        The change is below 0 or above `MAX_CHANGE`.
-    """
-    if not 0.0 <= change <= MAX_CHANGE:
-        raise SeipError(f"sizes change by a share of 0 to {MAX_CHANGE:g}, not {change:g}")
-    sizes = np.array([_size(user) for user in trajectories.users])
-    factors = 1.0 + change * _generator(seed, int(trajectories.key, 16)).uniform(-1.0, 1.0, sizes.shape)
-    return (yield from with_sizes(trajectories, sizes * factors))
-
-
-def with_sizes(trajectories: Trajectories, wanted: Float) -> Generator[Progress, None, Trajectories]:
-    """Give each road user a size; one that would overlap another grows less, or not at all.
-
-    Parameters
-    ----------
-    wanted : (u, 3) float64, metres
-        Length, width and height of each road user.
-
-    Returns
-    -------
-    Trajectories
-        Trajectories in which no two road users overlap that did not before.
+    A road user that would overlap another grows less, or not at all. With the same seed, a larger change modifies each
+    dimension in the same direction, and more. Different traffic has different factors.
     """
     users = trajectories.users
-    own = np.array([_size(user) for user in users])
+    own = np.array([(user.length, user.width, user.height) for user in users])
+    random = np.random.default_rng([seed, _STREAM, int(trajectories.key, 16)])
+    goal = own * (1.0 + change * random.uniform(-1.0, 1.0, own.shape))
     before = yield from find_overlaps(trajectories)
     known = {tuple(pair) for pair in before.pair.tolist()}
     growth = np.ones(len(users))
-    found = trajectories
+    changed = trajectories
     for halvings in range(_HALVINGS + 1):
-        sizes = np.where(wanted > own, own + growth[:, None] * (wanted - own), wanted)
+        sizes = np.where(goal > own, own + growth[:, None] * (goal - own), goal)
         sizes = np.where(sizes == own, own, sizes.round(3))
-        found = replace(trajectories, users=tuple(map(_with_size, users, sizes.tolist())))
-        overlaps = yield from find_overlaps(found)
+        changed = replace(trajectories, users=tuple(map(_with_size, users, sizes.tolist())))
+        overlaps = yield from find_overlaps(changed)
         pairs = [pair for pair in overlaps.pair.tolist() if tuple(pair) not in known]
         if not pairs:
             break
         growth[np.unique(pairs)] *= 0.5 if halvings < _HALVINGS - 1 else 0.0
-    return found
+    return changed
 
 
 def draw_size(category: str, random: np.random.Generator) -> tuple[float, float, float]:
@@ -164,16 +122,6 @@ def draw_size(category: str, random: np.random.Generator) -> tuple[float, float,
     kinds = list(KINDS[category].values())
     shares = np.array([kind.share for kind in kinds])
     kind = kinds[int(random.choice(len(kinds), p=shares / shares.sum()))]
-    return _draw_of(kind, random)
-
-
-def draw_shape(category: str, random: np.random.Generator) -> tuple[float, float, float, float]:
-    """Return a shape of a category: uniform within its `SHAPES`."""
-    shift, spread, rise, stretch = (random.uniform(-1.0, 1.0, 4) * SHAPES[category]).round(4).tolist()
-    return shift, spread, rise, stretch
-
-
-def _draw_of(kind: BodyKind, random: np.random.Generator) -> tuple[float, float, float]:
     means, deviations = np.array([kind.length, kind.width, kind.height]).T
     while True:
         common, own = random.standard_normal(), random.standard_normal(3)
@@ -183,25 +131,15 @@ def _draw_of(kind: BodyKind, random: np.random.Generator) -> tuple[float, float,
             return length, width, height
 
 
-def _size_within_kinds(user: RoadUser, random: np.random.Generator) -> tuple[float, float, float]:
-    size = draw_size(user.category, random)
-    longest = max(kind.length[0] + REACH * kind.length[1] for kind in KINDS[user.category].values())
-    return size if user.length <= longest else _size(user)
+def draw_shape(category: str, random: np.random.Generator) -> tuple[float, float, float, float]:
+    """Return a shape of a category: uniform within its `SHAPES`."""
+    shift, spread, rise, stretch = (random.uniform(-1.0, 1.0, 4) * SHAPES[category]).round(4).tolist()
+    return shift, spread, rise, stretch
 
 
 def _with_size(user: RoadUser, size: list[float]) -> RoadUser:
     length, width, height = size
     return replace(user, length=length, width=width, height=height)
-
-
-def _size(user: RoadUser) -> tuple[float, float, float]:
-    return user.length, user.width, user.height
-
-
-def _generator(seed: int, stream: int = 0) -> np.random.Generator:
-    if seed < 0:
-        raise SeipError(f"a seed of bodies is a whole number of 0 or more, not {seed}")
-    return np.random.default_rng([seed, _STREAM, stream])
 
 
 _STREAM = 0x626F6479  # keeps these draws apart from others of the same seed

@@ -3,14 +3,15 @@
 seip study random-sites -o out/sites --sites 16
 seip study site-training out/sites/*/site.blend -o out/detector
 
-The runs of traffic of each scene are in the folder SCENE_traffic next to it. The last sites are set aside for
-validation, which decides when to stop. Rerun the command to resume an interrupted training.
+The runs of traffic of each scene are in the folder SCENE_traffic next to it. Half of the frames are changed to be as
+recordings are, and groups and sizes of road users vary. The last sites are set aside for validation, which decides when
+to stop. Rerun the command to resume an interrupted training.
 """
 
 import argparse
 import math
-from collections.abc import Generator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Generator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TypeVar
 
@@ -19,46 +20,37 @@ from headless.charts.detection import save_training_chart
 from headless.detection.detector import Detector, check_device
 from headless.detection.detector_evaluation import AT_ONCE, side_by_side
 from headless.detection.frames import SampledRecording
-from headless.detection.recordings import Simulator, sampled_runs
+from headless.detection.recordings import MountedSensors, SampledRun, Simulator, sampled_runs
 from headless.detection.settings import NetworkSettings, TrainingSettings
 from headless.detection.training import train
 from headless.options import add_settings, new_parser, read_settings, real_number
-from headless.studies.detection.case_study import simulated
-from headless.studies.site_training.training_site import TrainingSite, field_runs
+from headless.studies.detection.case_study import recorded, simulated
+from headless.studies.random_sites.companions import with_companions
+from headless.studies.random_sites.varied_bodies import resized
 
 import bpy
 import numpy as np
 
 from seip_addon.core.errors import SeipError
+from seip_addon.core.geometry.orientation import orientation
 from seip_addon.core.limits import TIME_STEP
 from seip_addon.core.progress import Progress
-from seip_addon.core.sensing.lidar.catalogue import load_catalogue
-from seip_addon.core.sensing.lidar.model import fields_of_view
+from seip_addon.core.sensing.lidar.catalogue import find_models, load_catalogue
+from seip_addon.core.sensing.lidar.model import LidarModel, fields_of_view
+from seip_addon.core.sensing.scans.sensor import MountedSensor
 from seip_addon.core.sensing.scans.simulation import ScanSettings
 from seip_addon.core.sensing.traffic.site_traffic import require_own_traffic
-from seip_addon.core.site.candidates import CandidateSettings
+from seip_addon.core.site.candidates import Candidates, CandidateSettings
+from seip_addon.core.site.scene_geometry import SceneGeometry
 from seip_addon.core.site.site import make_site
-from seip_addon.core.workflows.survey_settings import SurveySettings
 from seip_addon.scene.read import read_scene
+
+from .field_conditions import field_recording
 
 HEIGHTS = (3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0)  # metres
 TILTS = (0.0, math.radians(5.0), math.radians(10.0), math.radians(15.0))
-TYPES = (
-    "type1",
-    "type2",
-    "type3",
-    "vlp16",
-    "vlp32c",
-    "hdl64e",
-    "os0_128",
-    "os1_64_rev7",
-    "os1_128",
-    "pandar64",
-    "xt32",
-    "ruby_plus",
-    "helios_5515",
-    "at128",
-)
+SIZE_CHANGE = 0.15  # largest relative change of the dimensions of road users
+MAX_SENSORS = 5  # of a random placement
 NETWORK = NetworkSettings()
 ASIDE = 8  # one of this number of sites is set aside
 MIN_SITES = 2
@@ -69,26 +61,25 @@ Site = TypeVar("Site")
 def main(argv: list[str]) -> None:
     """Simulate scans of random placements at every site, and train a detector on them."""
     options = _parser().parse_args(argv)
-    network, training = NETWORK, read_settings(TrainingSettings, options)
-    every_type = tuple(load_catalogue(())) if options.field_conditions else TYPES
-    learning = LearningSettings(
-        tuple(options.sensor or every_type), options.placements, options.every, training.seed, options.field_conditions
-    )
+    training = read_settings(TrainingSettings, options)
+    sensors = tuple(options.sensor or load_catalogue(()))
     check_device(options.device)
     runtime.check_folder(options.output)
     training_recordings, validation = (
         [
             recording
             for number, scene in scenes
-            for recording in runtime.finish_with_bar(_sampled(read_site(scene, learning), number, network, learning))
+            for recording in runtime.finish_with_bar(
+                site_recordings(scene, sensors, options.placements, options.every, [training.seed, number])
+            )
         ]
         for scenes in set_aside(list(enumerate(options.scenes)))
     )
     store = options.output / "training.pt"
     start = None if options.start is None else Detector.load(options.start, options.device)
-    if start is not None and start.settings != network:
-        raise SeipError(f"{options.start} is of another network: give the network's options as in its training")
-    steps = train(training_recordings, validation, network, training, device=options.device, store=store, start=start)
+    if start is not None and start.settings != NETWORK:
+        raise SeipError(f"{options.start} is of another network: start from a detector of this version")
+    steps = train(training_recordings, validation, NETWORK, training, device=options.device, store=store, start=start)
     trained = runtime.finish_with_bar(steps)
     best = trained.curve.best
     trained.detector.save(options.output / "detector.pt", half=True)
@@ -97,62 +88,6 @@ def main(argv: list[str]) -> None:
         f"best after {best:,} steps: average precision {trained.curve.validation[best]:.1%} at sites set aside"
     )
     runtime.print_line(f"written to {options.output}/")
-
-
-@dataclass(frozen=True)
-class LearningSettings:
-    """Settings of the training scans of each site.
-
-    Parameters
-    ----------
-    sensors : tuple of str
-        Catalogue keys of the types.
-    placements : int
-        Number of random placements for each run of traffic.
-    every : float, seconds
-        Time between frames.
-    seed : int
-        Seed of random placements, and of the noise of scans.
-    field_conditions : bool
-        Whether half of the frames are changed to be as recordings are (`field_conditions.field_frame`), with a rolling
-        shutter, groups of pedestrians, and sizes changed by up to `SIZE_CHANGE` in half of the runs.
-    """
-
-    sensors: tuple[str, ...] = TYPES
-    placements: int = 1
-    every: float = 2.5
-    seed: int = 1
-    field_conditions: bool = False
-
-
-def read_site(scene: Path, learning: LearningSettings) -> TrainingSite:
-    """Read a scene with the runs of traffic next to it.
-
-    Raises
-    ------
-    SeipError
-        The scene cannot be read, or has no runs of traffic.
-    """
-    runtime.open_scene(scene)
-    geometry = read_scene(bpy.context.scene).geometry
-    survey_settings = SurveySettings(
-        candidates=CandidateSettings(sensors=learning.sensors, heights=HEIGHTS, tilts=TILTS)
-    )
-    models = survey_settings.models()
-    candidates = make_site(
-        geometry,
-        survey_settings.candidates,
-        survey_settings.grid_spacing,
-        survey_settings.reach(),
-        fields_of_view(models),
-    ).candidates
-    runs = sampled_runs(survey.runs_beside(scene), geometry.origin, learning.every)
-    if not runs:
-        raise SeipError(f"{scene} has no runs of traffic in the folder next to it: simulate some with `seip traffic`")
-    for run in runs:
-        require_own_traffic(run.trajectories, geometry, run.name)
-    simulator = Simulator(geometry, ScanSettings(seed=learning.seed, rolling_shutter=learning.field_conditions))
-    return TrainingSite(f"{scene.parent.name}/{scene.stem}", geometry, candidates, models, runs, simulator)
 
 
 def set_aside(sites: Sequence[Site]) -> tuple[Sequence[Site], Sequence[Site]]:
@@ -169,21 +104,109 @@ def set_aside(sites: Sequence[Site]) -> tuple[Sequence[Site], Sequence[Site]]:
     return sites[:-aside], sites[-aside:]
 
 
-def _sampled(
-    site: TrainingSite, number: int, network: NetworkSettings, learning: LearningSettings
+def site_recordings(
+    scene: Path, sensors: Sequence[str], placements: int, every: float, seed: Sequence[int]
 ) -> Generator[Progress, None, list[SampledRecording]]:
-    """Simulate scans of random placements in all runs of a site."""
-    area = site.simulator.area(network.pillar)
-    random = np.random.default_rng([learning.seed, number])
-    if learning.field_conditions:
-        site = replace(site, runs=(yield from field_runs(site.runs, random)))
-        scans = site.field_scans(learning.placements, random, area, [learning.seed, number])
-    else:
-        scans = site.scans(learning.placements, random)
-    recordings = [SampledRecording(one, area, network.most_points) for one in scans]
+    """Simulate scans of all runs of traffic next to a scene, by random placements.
+
+    Parameters
+    ----------
+    sensors : sequence of str
+        Catalogue keys of the types.
+    placements : int
+        Number of random placements for each run of traffic, different ones for each run.
+    every : float, seconds
+        Time between frames.
+    seed : (int, int)
+        Seed of the training, and number of the site.
+
+    Raises
+    ------
+    SeipError
+        The scene cannot be read, or has no runs of traffic.
+    """
+    runtime.open_scene(scene)
+    geometry = read_scene(bpy.context.scene).geometry
+    models = find_models(load_catalogue(()), sensors)
+    candidates = candidates_of_types(geometry, models)
+    runs = sampled_runs(survey.runs_beside(scene), geometry.origin, every)
+    if not runs:
+        raise SeipError(f"{scene} has no runs of traffic in the folder next to it: simulate some with `seip traffic`")
+    for run in runs:
+        require_own_traffic(run.trajectories, geometry, run.name)
+    simulator = Simulator(geometry, ScanSettings(seed=seed[0], rolling_shutter=True))
+    area, random = simulator.area(NETWORK.pillar), np.random.default_rng(seed)
+    name = f"{scene.parent.name}/{scene.stem}"
+    runs = yield from varied_runs(runs, random)
+    drawn = [
+        (random_placement(f"{name}, placement {number}", candidates, models, random), run)
+        for run in runs
+        for number in range(1, placements + 1)
+    ]
+    scans = [
+        field_recording(recorded(simulator, placed, run), area, placed.sensors, [*seed, number])
+        for number, (placed, run) in enumerate(drawn)
+    ]
+    recordings = [SampledRecording(one, area, NETWORK.most_points) for one in scans]
     yield from side_by_side([simulated([one]) for one in recordings], AT_ONCE)
-    site.simulator.forget()
+    simulator.forget()
     return recordings
+
+
+def candidates_of_types(geometry: SceneGeometry, models: Mapping[str, LidarModel]) -> dict[str, Candidates]:
+    """Return the candidate poses of each sensor type; types of the same field of view share them.
+
+    The candidates of all types together would be more than a site may have.
+    """
+    fields = fields_of_view(models)
+    by_field: dict[float, Candidates] = {}
+    for key, field in fields.items():
+        if field not in by_field:
+            settings = CandidateSettings(sensors=(key,), heights=HEIGHTS, tilts=TILTS)
+            by_field[field] = make_site(geometry, settings, fields_of_view=fields).candidates
+    return {key: by_field[field] for key, field in fields.items()}
+
+
+def varied_runs(
+    runs: Sequence[SampledRun], random: np.random.Generator
+) -> Generator[Progress, None, tuple[SampledRun, ...]]:
+    """Return runs with groups of pedestrians, half of them with other sizes of all road users (`SIZE_CHANGE`)."""
+    varied = []
+    for run in runs:
+        seed, other_sizes = int(random.integers(1 << 31)), bool(random.integers(2))
+        trajectories = yield from with_companions(run.trajectories, seed)
+        if other_sizes:
+            trajectories = yield from resized(trajectories, SIZE_CHANGE, seed)
+        varied.append(replace(run, trajectories=trajectories))
+    return tuple(varied)
+
+
+def random_placement(
+    name: str, candidates: Mapping[str, Candidates], models: Mapping[str, LidarModel], random: np.random.Generator
+) -> MountedSensors:
+    """Return 1 to `MAX_SENSORS` sensors at different positions; positions, and then their poses, are equally likely.
+
+    Half of the placements have sensors of only one type.
+
+    Parameters
+    ----------
+    candidates : mapping of str to Candidates
+        Candidate poses of each type, all at the same positions.
+    """
+    positions = np.unique(next(iter(candidates.values())).position_of)
+    count = int(random.integers(1, min(MAX_SENSORS, len(positions)) + 1))
+    types = sorted(models)
+    if random.integers(2):
+        types = [types[int(random.integers(len(types)))]]
+    sensors = []
+    for number, position in enumerate(random.choice(positions, count, replace=False).tolist(), 1):
+        key = types[int(random.integers(len(types)))]
+        own = candidates[key]
+        poses = np.flatnonzero(own.position_of == position)
+        pose = int(poses[int(random.integers(len(poses)))])
+        rotation = orientation(float(own.yaw[pose]), float(own.tilt[pose]))
+        sensors.append(MountedSensor(f"S{number}", models[key], own.xyz[pose], rotation))
+    return MountedSensors(name, tuple(sensors))
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -192,32 +215,17 @@ def _parser() -> argparse.ArgumentParser:
         "scenes", nargs="+", type=Path, metavar="SCENE", help="scenes (.blend), each with its traffic next to it"
     )
     parser.add_argument("-o", "--output", type=Path, required=True, help="folder for the detector")
-    learning = parser.add_argument_group("training data")
-    default = LearningSettings()
-    learning.add_argument(
-        "--sensor",
-        nargs="+",
-        metavar="KEY",
-        help="types in the placements (default: several, in field conditions all of the catalogue)",
+    data = parser.add_argument_group("training data")
+    data.add_argument(
+        "--sensor", nargs="+", metavar="KEY", help="types in the placements (default: all of the catalogue)"
     )
-    learning.add_argument(
-        "--placements",
-        type=int,
-        default=default.placements,
-        metavar="N",
-        help="random placements for each run of traffic",
+    data.add_argument(
+        "--placements", type=int, default=1, metavar="N", help="random placements for each run of traffic"
     )
-    learning.add_argument(
-        "--every", type=real_number(TIME_STEP), default=default.every, metavar="S", help="time between frames, seconds"
+    data.add_argument(
+        "--every", type=real_number(TIME_STEP), default=2.5, metavar="S", help="time between frames, seconds"
     )
-    learning.add_argument(
-        "--field-conditions",
-        action="store_true",
-        help="change half of the frames to be as recordings are, and vary groups and sizes of road users",
-    )
-    learning.add_argument(
-        "--seed", type=int, default=default.seed, metavar="N", help="seed for placements, noise, weights and order"
-    )
+    data.add_argument("--seed", type=int, default=1, metavar="N", help="seed for placements, noise, weights and order")
     work = parser.add_argument_group("training")
     work.add_argument("--start", type=Path, metavar="PT", help="detector to start from (default: random weights)")
     add_settings(work, TrainingSettings, "steps", "batch", "learning_rate", "patience")

@@ -3,7 +3,7 @@
 Simulated frames have the true background and the true height of the road. In a recording both are estimated, sensors
 are calibrated to decimetres, rows of beams fail, and intensities may be unknown. Each function changes one of these in
 a frame, by a generator of random numbers and nothing else. Sensor types, sizes and groups of road users are drawn
-before the scans are simulated (`headless.studies.site_training`).
+before the scans are simulated (`site_training.command`).
 """
 
 from __future__ import annotations

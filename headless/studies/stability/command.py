@@ -1,37 +1,105 @@
 """Find where each method begins to fail, and write the stability page with its charts.
 
 seip study stability scenes/junction.blend -o docs
-seip study stability scenes/junction.blend -o docs --only weather
 blender -b --python-exit-code 1 site.blend -P headless/study.py -- stability -o docs
-
-Finished chapters are stored in the work folder: rerun the command to resume.
 """
 
 import argparse
+from collections.abc import Callable, Generator, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from headless import runtime, survey
+from headless.charts import robustness as robustness_charts
 from headless.options import new_parser
-from headless.studies.stability.chapters import CHAPTERS, StabilityScope, StudiedScene, chapters, introduction
-from headless.studies.stability.page import load_chapter, put_chapter, save_chapter, save_page
+from headless.studies.stability.charts import save_convergence_chart, save_delta_chart
+from headless.studies.stability.criterion import criterion_rows, criterion_study
+from headless.studies.stability.page import Chapter, save_page
+from headless.studies.stability.robustness_rows import pose_rows, robust_rows, traffic_rows
+from headless.studies.stability.weather import COUNT, SENSOR, weather_rows, weather_study
 from headless.studies.survey_options import add_survey_options
 
-from seip_addon.core.choosing.placement.objective import DEFAULT_COUNT, Objective, check_objective
-from seip_addon.core.errors import SeipError
+from seip_addon.core.choosing.placement.objective import DEFAULT_COUNT, Objective, check_objective, placement_problem
+from seip_addon.core.choosing.placement.problem import PlacementProblem
+from seip_addon.core.choosing.placement.risk import Risk
+from seip_addon.core.choosing.placement.scenarios import Scenarios
+from seip_addon.core.choosing.robustness.comparison import Comparison
+from seip_addon.core.choosing.robustness.pose_study import pose_study
+from seip_addon.core.choosing.robustness.robust_problem import RobustProblem
+from seip_addon.core.progress import Progress
 from seip_addon.core.sensing.traffic.trajectories import Trajectories
-from seip_addon.core.storage.files import digest
-from seip_addon.core.storage.source_digest import source_digest
-from seip_addon.core.workflows.survey import grid_key
+from seip_addon.core.workflows.survey import Survey, surroundings
+from seip_addon.core.workflows.traffic_runs import split_runs
 
-PAGE, CHARTS = "stability.md", "stability"
+TAIL_RISKS = (Risk(), Risk(tail=0.25), Risk(tail=0.0))
+"""Risks studied over pose errors: the mean, the worst quarter and the worst scenario."""
+
+FAILURE_RISKS = (Risk(failure="worst"), Risk(failure="mean"))
+
+
+@dataclass(frozen=True)
+class StabilityScope:
+    """Sizes of the studies.
+
+    Parameters
+    ----------
+    grids : int
+        Number of random grids of targets.
+    draws : (int, int)
+        Number of draws of the study of pose errors, with all kinds of errors and with each single kind.
+    robust, traffic : Scenarios
+        Scenarios of robust placements.
+    """
+
+    grids: int = 40
+    draws: tuple[int, int] = (500, 100)
+    robust: Scenarios = Scenarios("pose-errors")
+    traffic: Scenarios = Scenarios("traffic")
+
+
+@dataclass(frozen=True, eq=False)
+class StudiedScene:
+    """A scene to study, with its traffic and the folder of charts.
+
+    Parameters
+    ----------
+    runs : list of Trajectories
+        Runs of traffic next to the scene; may be empty.
+    """
+
+    survey: Survey
+    runs: list[Trajectories]
+    charts: Path
+    scope: StabilityScope
+
+    @property
+    def sensor(self) -> str:
+        """The middle one of the sensor types, which neither covers nearly everything nor nearly nothing."""
+        sensors = list(self.survey.models)
+        return sensors[len(sensors) // 2]
+
+    @property
+    def placed(self) -> str:
+        """Name of the placement for titles."""
+        return f"{DEFAULT_COUNT} × {self.sensor}"
+
+    def problem(self) -> PlacementProblem:
+        """Return the placement problem of `DEFAULT_COUNT` sensors of that type."""
+        site = self.survey.site
+        problem = placement_problem(site, self.survey.grid.visible, self.survey.models, Objective(count=DEFAULT_COUNT))
+        return replace(problem, forbidden=problem.forbidden | (site.candidates.sensor != self.sensor))
+
+
+Work = Callable[[StudiedScene], Generator[Progress, None, Chapter]]
 
 
 def main(argv: list[str], scope: StabilityScope | None = None) -> None:
-    """Study the chapters that are not finished, and write the page; tests pass a small ``scope``."""
-    options = _parser().parse_args(argv)
-    charts = options.output / CHARTS
-    if options.only and not (options.output / PAGE).is_file():
-        raise SeipError(f"there is no page {options.output / PAGE} to add chapters to: leave out --only")
+    """Study all chapters, and write the page; tests pass a small ``scope``."""
+    parser = new_parser("study stability", "Find the limits of every method, and write a page with charts.")
+    add_survey_options(parser)
+    parser.add_argument("--work", type=Path, default=Path("out/stability"), help="folder for the visibility grid")
+    options = parser.parse_args(argv)
+    charts = options.output / "stability"
     runtime.check_folder(charts)
     surveyed, watch = survey.survey(
         argparse.Namespace(**vars(options) | {"output": options.work}),
@@ -40,42 +108,105 @@ def main(argv: list[str], scope: StabilityScope | None = None) -> None:
     origin = surveyed.geometry.origin
     runs = [Trajectories.load(path).moved_to(origin) for path in survey.runs_beside(options.scene)]
     scene = StudiedScene(surveyed, runs, charts, scope or StabilityScope())
-    made_from = digest(
-        grid_key(surveyed),
-        repr(surveyed.settings),
-        repr(scene.scope),
-        *(run.key for run in runs),
-        source_digest("headless.studies.stability.command"),
-    )
-    done = []
-    requested = [(name, work) for name, work in chapters(scene) if name in (options.only or [name])]
-    for name, work in requested:
-        chapter = load_chapter(options.work / f"{name}.json", made_from)
-        if chapter is None or not all((charts / chart.file).exists() for chart in chapter.charts):
-            chapter = watch.run(name, work(scene))
-            save_chapter(options.work / f"{name}.json", chapter, made_from)
-            runtime.LOG.info(f"{chapter.title}: {len(chapter.rows)} rows, {watch.seconds[name]:.0f} s")
-        done.append(chapter)
+    studies: dict[str, Work] = {"criterion": criterion, "poses": poses, "failures": failures}
+    studies |= {"traffic": traffic} if len(runs) > 1 else {}
+    studies |= {"weather": weather}
+    chapters = []
+    for name, study in studies.items():
+        chapters.append(watch.run(name, study(scene)))
+        runtime.LOG.info(f"{chapters[-1].title}: {len(chapters[-1].rows)} rows, {watch.seconds[name]:.0f} s")
     with runtime.incomplete_if_interrupted(options.output):
-        if options.only:
-            for chapter in done:
-                put_chapter(options.output / PAGE, chapter, CHARTS)
-        else:
-            save_page(options.output / PAGE, introduction(scene), done, CHARTS)
-    runtime.print_line(f"written to {options.output / PAGE}")
+        save_page(options.output / "stability.md", introduction(surveyed), chapters, "stability")
+    runtime.print_line(f"written to {options.output / 'stability.md'}")
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = new_parser("study stability", "Find the limits of every method, and write a page with charts.")
-    add_survey_options(parser)
-    parser.add_argument(
-        "--only",
-        nargs="+",
-        choices=CHAPTERS,
-        metavar="CHAPTER",
-        help=f"update only these chapters: {', '.join(CHAPTERS)}",
+def introduction(surveyed: Survey) -> str:
+    """Return the introduction of the page."""
+    site = surveyed.site
+    return (
+        "For each method: the point at which it begins to fail, how that was found, and what the program does about "
+        f"it. Written by `seip study stability`: {site.name}, {len(site.targets):,} targets, "
+        f"{len(site.candidates):,} poses. Brackets hold 95 % intervals. Warnings about a scene and a placement are "
+        "shown in the panel and in the batch output, and stored in `placement.json`; the warning about occlusion by "
+        "traffic needs an evaluation in traffic."
     )
-    parser.add_argument(
-        "--work", type=Path, default=Path("out/stability"), help="folder for finished work, from which a rerun resumes"
+
+
+def criterion(scene: StudiedScene) -> Generator[Progress, None, Chapter]:
+    """Vary δ and grid spacings."""
+    survey, name = scene.survey, scene.survey.site.name
+    delta = survey.settings.visibility.delta
+    study = yield from criterion_study(survey.geometry, survey.settings, DEFAULT_COUNT, draws=scene.scope.grids)
+    save_delta_chart(scene.charts / "delta.png", study, delta, f"{name}: coverage against δ")
+    save_convergence_chart(scene.charts / "convergence.png", study, f"{name}: spacings")
+    return Chapter(
+        "The criterion of visibility",
+        criterion_rows(study, delta),
+        {
+            "delta.png": "Coverage of the best placement, and share of targets in view of its sensors, against δ",
+            "convergence.png": "Coverage of the best placement against the spacings of targets and posts",
+        },
     )
-    return parser
+
+
+def poses(scene: StudiedScene) -> Generator[Progress, None, Chapter]:
+    """Study a placement under pose errors."""
+    survey, errors = scene.survey, scene.scope.robust.pose_errors
+    study = yield from _robust(scene, TAIL_RISKS)
+    deployment = survey.deploy(study[0].nominal.placement.chosen)
+    under_errors = yield from pose_study(surroundings(survey), deployment, errors, 0, scene.scope.draws)
+    robustness_charts.save_spread_chart(scene.charts / "spread.png", study, f"{scene.placed} under pose errors")
+    robustness_charts.save_loss_chart(scene.charts / "blame.png", under_errors, f"{scene.placed}: what costs coverage")
+    robustness_charts.save_frontier_chart(
+        scene.charts / "frontier.png", study, f"{scene.placed}: what robustness costs and saves"
+    )
+    return Chapter(
+        f"Pose errors: {scene.placed}",
+        (*pose_rows(under_errors), *robust_rows(study)),
+        {
+            "spread.png": "Distribution of coverage over unseen draws: nominal optimum and robust placements",
+            "blame.png": "Mean loss with errors of only one sensor, and with only one kind of error",
+            "frontier.png": "Cost of robustness in planned coverage, and gain in the 5 % quantile",
+        },
+    )
+
+
+def failures(scene: StudiedScene) -> Generator[Progress, None, Chapter]:
+    """Study placements under sensor failures."""
+    study = yield from _robust(scene, FAILURE_RISKS)
+    robustness_charts.save_spread_chart(scene.charts / "failures.png", study, f"{scene.placed}: failures")
+    caption = "Distribution of remaining coverage over unseen draws: placements for failures and the nominal optimum"
+    return Chapter(f"Failures: {scene.placed}", robust_rows(study), {"failures.png": caption})
+
+
+def traffic(scene: StudiedScene) -> Generator[Progress, None, Chapter]:
+    """Study placements in traffic."""
+    survey = scene.survey
+    problem = RobustProblem(surroundings(survey), scene.problem(), scene.scope.traffic, split_runs(scene.runs))
+    placements = yield from problem.placements([Risk()], survey.settings.limits)
+    (study,) = yield from problem.compare(*placements)
+    deployment = survey.deploy(study.robust.placement.chosen)
+    title = f"{scene.placed} in traffic"
+    robustness_charts.save_time_map(scene.charts / "time_seen.png", survey, deployment, study.robust, title)
+    robustness_charts.save_traffic_chart(scene.charts / "promise.png", study, scene.placed, title)
+    return Chapter(
+        f"Occlusion by traffic: {scene.placed}",
+        traffic_rows(study),
+        {
+            "time_seen.png": "Share of time for which each target, and the point above it, is visible in traffic",
+            "promise.png": "Coverage of placements on the empty road and, on average over time, in traffic",
+        },
+    )
+
+
+def weather(scene: StudiedScene) -> Generator[Progress, None, Chapter]:
+    """Study a fleet in rain and fog."""
+    answers = yield from weather_study(scene.survey.geometry, scene.survey.settings)
+    return Chapter(f"Weather: {COUNT} × {SENSOR}", weather_rows(answers), {})
+
+
+def _robust(scene: StudiedScene, risks: Sequence[Risk]) -> Generator[Progress, None, tuple[Comparison, ...]]:
+    """Optimise for risk measures, and evaluate the placements on held-out scenarios."""
+    problem = RobustProblem(surroundings(scene.survey), scene.problem(), scene.scope.robust)
+    placements = yield from problem.placements(risks, scene.survey.settings.limits)
+    return (yield from problem.compare(*placements))

@@ -5,13 +5,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from seip_addon.core.choosing.robustness.comparison import Comparison, EvaluatedPlacement
-from seip_addon.core.choosing.robustness.pose_study import LOW_QUANTILE, NOTABLE_LOSS, PoseStudy
-from seip_addon.core.estimates import IntervalEstimate, mean_of, quantile_gain, quantile_of
+from seip_addon.core.choosing.robustness.pose_study import NOTABLE_LOSS, PoseStudy
+from seip_addon.core.estimates import IntervalEstimate, mean_of
 
-from .rows import Row
+from .page import Row
 
 MOSTLY_SEEN_SHARE = 0.9  # least share of time for which a target must be seen to be mostly seen
-QUANTILES = (0.05, 0.5, 0.95)  # of coverage, which must be the same in half of the draws
 
 
 def pose_rows(study: PoseStudy) -> tuple[Row, ...]:
@@ -29,8 +28,7 @@ def pose_rows(study: PoseStudy) -> tuple[Row, ...]:
             regime,
             f"planned {study.planned:.2%}; 5 % quantile {study.low.describe()}, "
             f"mean {mean_of(study.together).describe()}",
-            f"{len(study.together)} draws, errors of all sensors; half of them "
-            f"{'give the same result' if poses_converged(study) else 'give a different result: take more'}",
+            f"{len(study.together)} draws, errors of all sensors",
             "placement over pose errors: `seip place --pose-errors`; `--risk none` reports the 5 % quantile",
         ),
         Row(
@@ -56,14 +54,6 @@ def pose_rows(study: PoseStudy) -> tuple[Row, ...]:
     return tuple(rows)
 
 
-def poses_converged(study: PoseStudy) -> bool:
-    """Return whether half of the draws give the same mean and quantiles of coverage, within their intervals."""
-    whole = study.together
-    half = whole[: len(whole) // 2]
-    pairs = [(mean_of(half), mean_of(whole)), *((quantile_of(half, q), quantile_of(whole, q)) for q in QUANTILES)]
-    return all(one.agrees_with(other) for one, other in pairs)
-
-
 def robust_rows(comparisons: Sequence[Comparison]) -> tuple[Row, ...]:
     """Return the results of the study of robust placements as rows, one for each placement."""
     scenarios, errors = comparisons[0].scenarios, comparisons[0].scenarios.pose_errors
@@ -75,19 +65,11 @@ def robust_rows(comparisons: Sequence[Comparison]) -> tuple[Row, ...]:
             f"gives away {100 * one.price:.2f} points of planned coverage; 5 % quantile of "
             f"{one.robust.risk.describe_outcome()} {one.robust.low.describe()} against "
             f"{one.nominal.low.describe()} of the nominal optimum: {one.gain.as_change()}",
-            f"{scenarios.evaluated} draws not used in the optimisation; half of them "
-            f"{'give the same result' if gain_converged(one) else 'give a different result: take more'}",
+            f"{scenarios.evaluated} draws not used in the optimisation",
             f"certificate: within {one.robust.placement.gap:.2%} of the best possible objective",
         )
         for one in comparisons
     )
-
-
-def gain_converged(comparison: Comparison) -> bool:
-    """Return whether half of the unseen draws give the same gain in the 5 % quantile, within the intervals."""
-    robust, nominal = comparison.robust.held_out, comparison.nominal.held_out
-    half = len(robust) // 2
-    return quantile_gain(robust[:half], nominal[:half], LOW_QUANTILE).agrees_with(comparison.gain)
 
 
 def traffic_rows(comparison: Comparison) -> tuple[Row, ...]:
@@ -95,10 +77,7 @@ def traffic_rows(comparison: Comparison) -> tuple[Row, ...]:
     seen, traffic = comparison.nominal, comparison.robust
     regime = f"{seen.road_users:.0f} road users at a time"
     batches = len(np.unique(seen.instants.batch)) if seen.instants else 0
-    how = (
-        f"{len(seen.held_out)} instants in {batches} stretches of time, of runs not used in the optimisation; "
-        f"half of them {'give the same result' if comparison.is_converged() else 'give a different result: take more'}"
-    )
+    how = f"{len(seen.held_out)} instants in {batches} stretches of time, of runs not used in the optimisation"
     loss = Row(
         "view of the road",
         regime,

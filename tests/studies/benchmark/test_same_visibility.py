@@ -28,7 +28,7 @@ def site_of(scene: Path, grid: float = 1.0) -> Site:
 
 
 def lazy_is_full(site: Site, settings: VisibilitySettings, samples: int) -> None:
-    """Compare at places spread over the site, with both engines; every lazy run must be worth it as well."""
+    """Compare at positions spread over the site, with both engines; lazy runs must cast few rays as well."""
     costs = visibility_costs(site, load_catalogue(), settings, samples)
     for engine in ("bvh", "embree"):
         full, lazy = costs[f"full {engine}"], costs[f"lazy {engine}"]

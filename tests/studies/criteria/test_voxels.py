@@ -3,8 +3,6 @@
 import math
 from dataclasses import replace
 
-from headless.studies.full_scan import beam_directions
-
 import pytest
 
 pytest.importorskip("torch", reason="torch is not installed: make detection")
@@ -20,6 +18,7 @@ from seip_addon.core.sensing.scans.scanner import ReflectiveSurface
 from seip_addon.core.sensing.traffic.trajectories import RoadUser, Trajectories
 from seip_addon.core.sensing.visibility.ray_casting import make_ray_caster
 from seip_addon.core.site.site import Targets
+from tests.oracles.full_scan import beam_directions
 
 FLAT = np.array([[[-99, -99, 0], [99, -99, 0], [99, 99, 0]], [[-99, -99, 0], [99, 99, 0], [-99, 99, 0]]], dtype=float)
 WALL = np.array([[[7, -9, 0], [7, 9, 0], [7, 9, 9]], [[7, -9, 0], [7, 9, 9], [7, -9, 9]]], dtype=float)

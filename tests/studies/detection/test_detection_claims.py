@@ -1,7 +1,5 @@
 """Each claim's verdict, both ways and open, on trials that are told and not run."""
 
-from dataclasses import replace
-
 from headless.studies.detection.claims import SeedResult, detection_claims
 
 PRICE = {"type1": 6000.0, "type2": 15000.0, "type3": 80000.0}
@@ -10,34 +8,29 @@ FALSE = (5.0, 3.0, 1.0)
 SPREAD = (-0.004, 0.0, 0.004)
 
 
-def trials(precision=None, *, false=FALSE, sparse=0.8, spread=SPREAD, padded=None):
+def trials(precision=None, *, false=FALSE, sparse=0.8, spread=SPREAD):
     told = []
     for sensor, reached in (PUBLISHED if precision is None else precision).items():
         way = 1 if sensor == "type1" else -1  # seeds that suit one type do not suit another
         for count, value, wrong in zip((1, 2, 4), reached, false, strict=True):
             for seed, off in enumerate(spread):
-                one = SeedResult(
-                    sensor=sensor,
-                    count=count,
-                    seed=seed,
-                    average_precision=value + way * off * count,  # gains vary as well, not the level alone
-                    price=PRICE[sensor] * count,
-                    coverage=0.9,
-                    false_positives=wrong + off,
-                    sparse=sparse + off,
+                told.append(
+                    SeedResult(
+                        sensor=sensor,
+                        count=count,
+                        seed=seed,
+                        average_precision=value + way * off * count,  # gains vary as well, not the level alone
+                        price=PRICE[sensor] * count,
+                        coverage=0.9,
+                        false_positives=wrong + off,
+                        sparse=sparse + off,
+                    )
                 )
-                told.append(one)
-                if padded is not None and sensor == "type1":
-                    told.append(replace(one, false_positives=wrong + padded, sparse=sparse, padded=True))
     return told
 
 
 def verdicts(*told, **more):
     return {claim.number: claim.verdict for claim in detection_claims(trials(*told, **more))}
-
-
-def evidence(number, *told, **more):
-    return next(claim.evidence for claim in detection_claims(trials(*told, **more)) if claim.number == number)
 
 
 def test_the_published_figures_hold():
@@ -59,10 +52,3 @@ def test_seeds_that_disagree_decide_nothing():
 def test_the_simplest_type_has_to_gain_more_than_every_other():
     assert verdicts(PUBLISHED | {"type3": (0.50, 0.80, 0.92)})[7] == "does not hold"
     assert verdicts(PUBLISHED | {"type3": (0.63, 0.80, 0.90)})[7] == "undecided"
-
-
-def test_padding_is_evaluated_where_it_was_tried():
-    assert verdicts(padded=1.0)[9] == "holds"
-    assert verdicts(padded=-0.5)[9] == "does not hold"
-    assert verdicts(padded=0.0)[9] == "undecided"
-    assert "type1, N = 1: 4.80 (4.80 to 4.80) padded, 4.00 (3.94 to 4.06) masked" in evidence(9, padded=1.0)

@@ -6,7 +6,6 @@ import pytest
 
 pytest.importorskip("torch", reason="torch is not installed: make detection")
 
-from headless.detection import suitability
 from headless.detection.rules import RULES
 from headless.studies.detection import command as evaluate
 
@@ -33,25 +32,19 @@ def run(small_scene, runs):
 @pytest.fixture(scope="module")
 def folder(run, tmp_path_factory):
     folder = tmp_path_factory.mktemp("evaluation")
-    run(folder, "--ablation", "--from-scratch")
+    run(folder, "--from-scratch")
     return folder
 
 
 def test_charts_show_what_was_found(folder):
-    for name in ("ap_by_count", "ap_by_price", "ap_by_coverage", "precision_recall", "where_type1", "errors_type1"):
+    for name in ("ap_by_price", "errors_type1", "detector-2"):
         assert imread(folder / f"{name}.png").shape[1] > 600
-    assert (folder / "detector-2-padded.png").exists()
 
 
 def test_the_table_has_a_row_for_each_detector_and_placement(folder):
     rows = list(csv.DictReader((folder / "detection.csv").read_text(encoding="utf-8").splitlines()))
-    cells = {(row["detector"], row["count"], row["padded"]) for row in rows}
-    assert cells == {
-        (f"detector-{seed}{'-padded' if padded else ''}", str(count), str(padded).lower())
-        for seed in (1, 2)
-        for padded in (False, True)
-        for count in (1, 2, 4)
-    }
+    cells = [(row["seed"], row["count"]) for row in rows]
+    assert cells == [(seed, count) for seed in "12" for count in "124"]
     coverage = [float(row["coverage"]) for row in rows[:3]]
     assert coverage == sorted(coverage)
     assert all(0 <= float(row["ap_bev_0.7"]) <= float(row["ap_bev_0.5"]) + 1e-9 <= 1 for row in rows)
@@ -62,16 +55,12 @@ def test_the_table_has_a_row_for_each_detector_and_placement(folder):
     assert {row["road_users_pedestrian_0.5"] for row in rows} == {"0"}
 
 
-def test_an_evaluation_goes_on_and_ends_the_same(run, folder, tmp_path, capsys, monkeypatch):
+def test_an_evaluation_goes_on_and_ends_the_same(run, folder, tmp_path, capsys):
     for name in ("visibility.npz", "detector-1.pt"):
         (tmp_path / name).write_bytes((folder / name).read_bytes())
-    monkeypatch.setattr(suitability, "MAX_OVERFULL_SHARE", -1.0)  # so that every cloud is worth a warning
-    run(tmp_path, "--ablation", "--from-scratch")
+    run(tmp_path, "--from-scratch")
     said = capsys.readouterr().out
-    assert all(f"warning: {count} × type1: " in said for count in (1, 2, 4))
     assert "vehicles of one run within 1 m of one of another at the same instant: run-1 and run-2 4%, " in said
-    assert "of the pillars with points have more than the 16 that are kept" in said
-    assert "at most 0% of the parked road users of a test run" in said
     assert "warning: 2 test runs of traffic give no interval over traffic" in said
     assert "bev_0.7_moving" in said
     for path in folder.iterdir():

@@ -2,11 +2,10 @@
 
 from headless.studies.paper.traffic_runs import (
     MOST_OVERLAP,
-    RunSettings,
     TrafficSource,
     make_runs,
     overlaps,
-    read_traffic_of_site,
+    read_demand_of_site,
 )
 
 from seip_addon.core.progress import finish
@@ -38,10 +37,10 @@ def files(folder, net=None, flows=None):
     return TrafficSource(folder / "a.rou.xml", (), folder / "a.net.xml")
 
 
-def test_what_goes_through_is_counted(tmp_path):
+def test_demand_is_that_of_all_flows(tmp_path):
     more = '<flow id="g" vehsPerHour="90"><route edges="e"/></flow>'
-    found = finish(read_traffic_of_site(files(tmp_path, flows=FLOWS.format(360, more)), street(), "a.xodr"))
-    assert (found.demand.rate, found.through) == (450.0, 360.0)
+    demand = finish(read_demand_of_site(files(tmp_path, flows=FLOWS.format(360, more)), street(), "a.xodr"))
+    assert demand.rate == 450.0
 
 
 NODES = '<nodes><node id="a" x="-300" y="0"/><node id="b" x="0" y="0"/><node id="c" x="300" y="0"/></nodes>'
@@ -53,25 +52,20 @@ STEADY = """<routes><vType id="t" speedDev="0" sigma="0"/>
 
 
 @needs_sumo
-def test_drawn_runs_are_independent_and_those_of_the_file_copies(tmp_path):
+def test_drawn_runs_are_independent_and_the_same_when_drawn_again(tmp_path):
     programs, net = find_sumo(), tmp_path / "made.net.xml"
     (tmp_path / "a.nod.xml").write_text(NODES, encoding="utf-8")
     (tmp_path / "a.edg.xml").write_text(EDGES, encoding="utf-8")
     given = ["--node-files", tmp_path / "a.nod.xml", "--edge-files", tmp_path / "a.edg.xml", "--output-file", net]
     finish(run(programs, programs.netconvert, [*given, "--offset.disable-normalization", "true"], "test"))
     source = files(tmp_path, net.read_text(encoding="utf-8"), STEADY)
-    traffic = finish(read_traffic_of_site(source, street(), "a.xodr"))
-    settings, scene = RunSettings(runs=4, duration=20.0, warm_up=30.0), tmp_path / "site.blend"
-    drawn, fixed = (finish(make_runs(scene, traffic, street(), settings, fixed=which)) for which in (False, True))
-    assert overlaps(drawn)[-1] <= MOST_OVERLAP < 0.5 < overlaps(fixed)[0]
+    demand = finish(read_demand_of_site(source, street(), "a.xodr"))
+    inputs = tmp_path / "site.blend", source, demand, street(), 4, 20.0
+    drawn = finish(make_runs(*inputs))
+    assert overlaps(drawn)[-1] <= MOST_OVERLAP
     assert len(overlaps(drawn)) == 6
     assert drawn == runs_in(tmp_path / "site_traffic")
     assert not list(tmp_path.glob("site_traffic*/*.xml"))
-    before = [path.read_bytes() for path in drawn]
     assert all(Trajectories.load(path).span[1] <= 20.0 for path in drawn)
-    times = [path.stat().st_mtime_ns for path in drawn]
-    assert finish(make_runs(scene, traffic, street(), settings, fixed=False)) == drawn
-    assert [path.stat().st_mtime_ns for path in drawn] == times
-    drawn[1].unlink()
-    finish(make_runs(scene, traffic, street(), settings, fixed=False))
-    assert [path.read_bytes() for path in drawn] == before
+    before = [path.read_bytes() for path in drawn]
+    assert [path.read_bytes() for path in finish(make_runs(*inputs))] == before

@@ -1,7 +1,6 @@
-"""Demand of a user's route file, drawn again or as it stands."""
+"""Demand of a user's route file, drawn randomly."""
 
 from collections import Counter
-from itertools import pairwise
 from xml.etree import ElementTree as ET
 
 from headless.studies.paper.route_file import read_demand, write_run
@@ -40,9 +39,9 @@ def demand(folder, routes=ROUTES, types=(TYPES,)):
     return finish(read_demand(path, files))
 
 
-def written(folder, asked, seed=1, duration=36000.0, **how):
+def written(folder, asked, seed=1, duration=36000.0):
     path = folder / "run.rou.xml"
-    write_run(path, asked, seed, duration, **how)
+    write_run(path, asked, seed, duration)
     return ET.parse(path).getroot().findall("vehicle"), path  # noqa: S314  # written just now
 
 
@@ -74,19 +73,6 @@ def test_each_seed_is_another_run_and_the_same_seed_the_same_bytes(tmp_path):
     assert texts[0] == texts[1] != texts[2]
     names = [{vehicle.get("id") for vehicle in written(tmp_path, asked, seed, 600.0)[0]} for seed in (1, 2)]
     assert not names[0] & names[1]
-
-
-def test_fixed_departures_are_even_and_the_same_for_all_seeds(tmp_path):
-    asked = demand(tmp_path)
-    (vehicles, path), text = written(tmp_path, asked, 1, 3600.0, fixed=True), None
-    text = path.read_bytes()
-    assert text == written(tmp_path, asked, 2, 3600.0, fixed=True)[1].read_bytes()
-    for edges, rate in RATES.items():
-        departs = [float(one.get("depart")) for one in vehicles if one.find("route").get("edges") == edges]
-        assert len(departs) == rate
-        assert departs[0] == 0.0
-        assert all(b - a == pytest.approx(3600 / rate, abs=0.11) for a, b in pairwise(departs))
-    assert b"departLane" not in text.replace(b'departLane="best"', b"")
 
 
 FLOW = '<routes><route id="r" edges="w e"/><flow id="a" {}/></routes>'

@@ -11,11 +11,12 @@ from headless.detection.detector import Detector
 from headless.detection.recordings import poses_key
 from headless.detection.settings import NetworkSettings
 from headless.studies.site_training import command as train_on_sites
-from headless.studies.site_training.random_placements import MAX_SENSORS, random_placement
+from headless.studies.site_training.command import HEIGHTS, MAX_SENSORS, TILTS, candidates_of_types, random_placement
 
 import numpy as np
 
 from seip_addon.core.errors import SeipError
+from seip_addon.core.sensing.lidar.catalogue import load_catalogue
 from tests.builders.small_junction import make_example
 
 BRIEF = ["--steps", "2", "--batch", "2", "--every", "15", "--sensor", "type1"]
@@ -41,7 +42,7 @@ def sites(small_scene, tmp_path_factory):
 
 def test_a_detector_is_trained_and_the_same_again(sites, tmp_path):
     for output in ("one", "other"):
-        train_on_sites.main([*sites, *BRIEF, "type1", "-o", str(tmp_path / output)])
+        train_on_sites.main([*sites, *BRIEF, "-o", str(tmp_path / output)])
     one, other = ((tmp_path / output / "detector.pt").read_bytes() for output in ("one", "other"))
     assert one == other
     detector = Detector.load(tmp_path / "one" / "detector.pt")
@@ -51,30 +52,28 @@ def test_a_detector_is_trained_and_the_same_again(sites, tmp_path):
     assert (weights == weights.half().float()).all()
 
 
-def test_field_conditions_change_the_training_and_it_continues_from_a_detector(sites, tmp_path, monkeypatch):
-    train_on_sites.main([*sites, *BRIEF, "type1", "-o", str(tmp_path / "plain")])
-    plain = tmp_path / "plain" / "detector.pt"
-    again = [*sites, *BRIEF, "type1", "--start", str(plain), "--learning-rate", "0.0001", "--field-conditions"]
-    for output in ("one", "other"):
-        train_on_sites.main([*again, "-o", str(tmp_path / output)])
-    one, other = ((tmp_path / name / "detector.pt").read_bytes() for name in ("one", "other"))
-    assert one == other != plain.read_bytes()
+def test_a_training_continues_from_a_detector_of_its_network(sites, tmp_path, monkeypatch):
+    train_on_sites.main([*sites, *BRIEF, "-o", str(tmp_path / "first")])
+    first = tmp_path / "first" / "detector.pt"
+    more = [*sites, *BRIEF, "--start", str(first), "--learning-rate", "0.0001", "-o", str(tmp_path / "second")]
+    train_on_sites.main(more)
     name = "feature_map.encoder.linear.weight"
-    near, far = (Detector.load(path).state_dict()[name] for path in (plain, tmp_path / "one" / "detector.pt"))
+    near, far = (Detector.load(tmp_path / part / "detector.pt").state_dict()[name] for part in ("first", "second"))
     assert 0 < (near - far).abs().max() < 0.01
     monkeypatch.setattr(train_on_sites, "NETWORK", replace(SMALL, width=16))
     with pytest.raises(SeipError, match="is of another network"):
-        train_on_sites.main([*sites, *BRIEF, "type1", "--start", str(plain), "-o", str(tmp_path / "x")])
+        train_on_sites.main(more)
 
 
 def test_random_placements_are_of_different_positions_and_all_poses():
     example = make_example()
-    candidates, models = example.site.candidates, example.models
+    models = example.models
+    candidates = dict.fromkeys(models, example.site.candidates)
     random = np.random.default_rng(3)
     drawn = [random_placement("one", candidates, models, random) for _ in range(200)]
     counts = {len(one.sensors) for one in drawn}
-    assert counts == set(range(1, min(MAX_SENSORS, len(candidates.position)) + 1))
-    poses = {tuple(place) for place in candidates.xyz.tolist()}
+    assert counts == set(range(1, min(MAX_SENSORS, len(example.site.candidates.position)) + 1))
+    poses = {tuple(place) for place in example.site.candidates.xyz.tolist()}
     for one in drawn:
         places = [tuple(sensor.xyz.tolist()) for sensor in one.sensors]
         assert len(set(places)) == len(places)
@@ -84,3 +83,13 @@ def test_random_placements_are_of_different_positions_and_all_poses():
     assert [poses_key(one) for one in drawn[:5]] == [
         poses_key(random_placement("one", candidates, models, again)) for _ in range(5)
     ]
+
+
+def test_every_type_of_the_catalogue_has_candidates_at_the_same_positions():
+    models = load_catalogue(())
+    candidates = candidates_of_types(make_example().geometry, models)
+    assert set(candidates) == set(models)
+    (positions,) = {tuple(np.unique(own.position_of).tolist()) for own in candidates.values()}
+    assert len(positions) > MAX_SENSORS
+    full, part = candidates["os1_128"], candidates["at128"]
+    assert len(full) == len(positions) * len(HEIGHTS) * len(TILTS) < len(part)

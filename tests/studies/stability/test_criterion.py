@@ -6,14 +6,7 @@ from pathlib import Path
 from unittest.mock import patch
 
 from headless.studies.stability import charts
-from headless.studies.stability.criterion import (
-    Draws,
-    criterion_rows,
-    criterion_study,
-    in_view,
-    ring_borders,
-    rotated_targets,
-)
+from headless.studies.stability.criterion import criterion_rows, criterion_study, deviation, in_view, rotated_targets
 
 import numpy as np
 import pytest
@@ -46,12 +39,6 @@ def test_lines_of_sight() -> None:
     assert not seen[4]  # out of range
 
 
-def test_borders_are_those_of_the_warning() -> None:
-    models = {"type1": load_catalogue()["type1"]}
-    for border in ring_borders(models, (3.5, 8.0), (0.5, 1.0), 80.0):
-        assert border.radius == unresolved_from(models["type1"], border.height, border.delta, 80.0)
-
-
 def test_turned_grids_cover_the_same_road() -> None:
     plain = rotated_targets(GEOMETRY, 1.0, np.zeros(2), 0.0)
     turned = rotated_targets(GEOMETRY, 1.0, np.array([0.3, 0.8]), 0.6)
@@ -61,12 +48,12 @@ def test_turned_grids_cover_the_same_road() -> None:
     assert gaps[gaps > 0].min() == pytest.approx(1.0)
 
 
-def test_spreads_hold_the_true_one() -> None:
+def test_intervals_contain_the_true_deviation() -> None:
     random = np.random.default_rng(0)
     held = 0
     for _ in range(200):
-        low, high = Draws("", random.normal(0, 2.0, 40)).spread_interval
-        held += low <= 2.0 <= high
+        spread = deviation(random.normal(0, 2.0, 40))
+        held += spread.low <= 2.0 <= spread.high
     assert held >= 180
 
 
@@ -79,29 +66,22 @@ def test_the_study_finds_the_border_of_the_rings(tmp_path: Path) -> None:
         grid_spacing=1.0,
         engine=ANY,
     )
-    with (
-        patch("headless.studies.stability.criterion.DELTAS", (0.5, 2.0)),
-        patch("headless.studies.stability.criterion.GRID_SPACINGS", (2.0, 1.0)),
-        patch("headless.studies.stability.criterion.CANDIDATE_SPACINGS", (16.0, 8.0)),
+    with patch.multiple(
+        "headless.studies.stability.criterion",
+        DELTAS=(0.5, 2.0),
+        GRID_SPACINGS=(2.0, 1.0),
+        CANDIDATE_SPACINGS=(16.0, 8.0),
     ):
         study = finish(criterion_study(GEOMETRY, settings, 2, draws=8))
-    (by_ratio,) = study.by_ratio
-    inside = [s.value for edge, s in zip(by_ratio.ratios, by_ratio.seen, strict=False) if s and 0.25 <= edge < 1]
-    beyond = [s.value for edge, s in zip(by_ratio.ratios, by_ratio.seen, strict=False) if s and edge >= 1.5]
-    assert min(inside) > 0.95
-    assert max(beyond) < 0.8
-    fine, wide = study.by_delta
-    assert fine.coverage < wide.coverage <= 1
-    assert fine.moved == 0
-    assert study.azimuth.spread < 0.02
-    assert len(criterion_rows(study, 0.5)) == 7
-    for number, draw in enumerate(
-        (
-            lambda path: charts.save_ring_border_chart(path, study, 0.5, "rings"),
-            lambda path: charts.save_border_check_chart(path, study, "border"),
-            lambda path: charts.save_delta_chart(path, study, 0.5, "delta"),
-            lambda path: charts.save_convergence_chart(path, study, "convergence"),
-        )
-    ):
-        draw(tmp_path / f"{number}.png")
-        assert (tmp_path / f"{number}.png").read_bytes().startswith(b"\x89PNG")
+    border = study.borders["type2"]
+    assert border.radius == {5.4: unresolved_from(load_catalogue()["type2"], 5.4, 0.5, 80.0)}
+    assert border.inside[0] > 0.95 * border.inside[1] > 0
+    assert border.beyond[0] < 0.8 * border.beyond[1]
+    fine, wide = study.by_delta["type2 at 5.4 m"]
+    assert fine.coverage < wide.coverage <= wide.view <= 1
+    assert fine.evaluated >= wide.evaluated
+    assert len(criterion_rows(study, 0.5)) == 5
+    charts.save_delta_chart(tmp_path / "delta.png", study, 0.5, "delta")
+    charts.save_convergence_chart(tmp_path / "convergence.png", study, "convergence")
+    for chart in tmp_path.iterdir():
+        assert chart.read_bytes().startswith(b"\x89PNG")

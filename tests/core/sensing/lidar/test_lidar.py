@@ -6,8 +6,6 @@ import math
 from pathlib import Path
 from typing import Any
 
-from headless.studies.full_scan import beam_directions
-
 import numpy as np
 import pytest
 
@@ -17,6 +15,7 @@ from seip_addon.core.sensing.lidar.catalogue import load_catalogue
 from seip_addon.core.sensing.lidar.model import LidarModel
 from seip_addon.core.sensing.lidar.noisy_returns import measured_returns, return_chance
 from seip_addon.core.sensing.lidar.range_equation import RangeEquation
+from tests.oracles.full_scan import beam_directions
 
 CATALOGUE = load_catalogue()
 

@@ -5,8 +5,6 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from headless.studies.full_scan import beam_directions
-
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
@@ -24,6 +22,7 @@ from seip_addon.core.sensing.visibility.beam_culling import (
 from seip_addon.core.sensing.visibility.near_surfaces import NearSurfaces, near_surfaces
 from seip_addon.core.sensing.visibility.settings import VisibilitySettings
 from seip_addon.core.site.scene_geometry import DEFAULT_REFLECTIVITY
+from tests.oracles.full_scan import beam_directions
 
 
 def surfaces_near(triangles: np.ndarray, targets: np.ndarray, delta: float) -> NearSurfaces:

@@ -3,7 +3,7 @@
 import math
 from dataclasses import replace
 
-from headless.studies.stability.spacings import Evaluator
+from headless.studies.stability.criterion import Evaluator
 
 import numpy as np
 import pytest

@@ -3,8 +3,6 @@
 import math
 from dataclasses import replace
 
-from headless.studies.full_scan import beam_directions
-
 import numpy as np
 import pytest
 
@@ -18,6 +16,7 @@ from seip_addon.core.sensing.visibility.visibility_model import visibility_model
 from tests.builders.synthetic_junction import junction_site
 from tests.engines import ANY, each_engine
 from tests.few import few
+from tests.oracles.full_scan import beam_directions
 
 MODELS = load_catalogue()
 SITE = junction_site()

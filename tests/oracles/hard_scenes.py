@@ -65,12 +65,6 @@ def hard_scenes(rays: int, random: np.random.Generator) -> list[HardScene]:
     ]
 
 
-def far_away(scene: HardScene, distance: float) -> HardScene:
-    """Return a scene moved in all directions, the computation in float64."""
-    way = distance * np.array([1.0, -1.0, 0.0])
-    return replace(scene, triangles=scene.triangles + way, origin=scene.origin + way)
-
-
 def stored_far_away(scene: HardScene, distance: float) -> HardScene:
     """Return a scene rounded to float32 far from the origin, as Blender stores it, and moved back."""
     way = distance * np.array([1.0, -1.0, 0.0])

@@ -1,10 +1,7 @@
-"""What the charts of average precision show, read back from what was drawn."""
+"""The chart of average precision against price, read back from what was drawn."""
 
-from headless.studies import precision_charts
-from headless.studies.precision_charts import (
-    PrecisionCell,
-    save_price_chart,
-)
+from headless.studies.detection import price_chart
+from headless.studies.detection.price_chart import PrecisionCell, save_price_chart
 
 import pytest
 
@@ -22,7 +19,7 @@ CELLS = (
 @pytest.fixture
 def figures(monkeypatch):
     """The figures that were saved."""
-    return record_figures(monkeypatch, precision_charts, style)
+    return record_figures(monkeypatch, price_chart, style)
 
 
 def test_price_chart_names_the_front(tmp_path, figures):

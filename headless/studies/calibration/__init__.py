@@ -1,1 +1,0 @@
-"""Comparison of LiDAR models with measured sweeps."""

@@ -1,0 +1,101 @@
+"""Frames in which every ray is cast against the whole scene: the reference for frames with cached returns."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from seip_addon.core.arrays import Float, Integer
+from seip_addon.core.geometry.orientation import rotations
+from seip_addon.core.sensing.lidar.noisy_returns import return_chance
+from seip_addon.core.sensing.scans.frame import STATIC_INSTANCE
+from seip_addon.core.sensing.scans.scanner import ReflectiveSurface, Scan, Scanner
+from seip_addon.core.sensing.scans.static_scene import StaticScene
+from seip_addon.core.sensing.traffic.bodies import Body
+from seip_addon.core.sensing.traffic.trajectories import Snapshot
+from seip_addon.core.sensing.visibility.ray_casting import make_ray_caster
+from seip_addon.core.sensing.visibility.settings import Engine
+
+SLACK = 1e-4
+"""Metres by which the same return may differ, and by which a ray may pass an edge to graze it."""
+
+_RAYS_AT_ONCE = 1 << 17
+
+
+def combined(
+    static: StaticScene, bodies: Sequence[Body], snapshot: Snapshot, engine: Engine
+) -> tuple[ReflectiveSurface, Integer]:
+    """Return the surface of the static scene with an instant's road users, and the owner of each triangle."""
+    placed = [
+        position + bodies[user].triangles @ attitude.T
+        for user, position, attitude in zip(
+            snapshot.user, snapshot.position, rotations(snapshot.yaw, snapshot.pitch), strict=True
+        )
+    ]
+    owner = [np.full(len(static.triangles), STATIC_INSTANCE)]
+    owner += [np.full(len(bodies[user].triangles), user) for user in snapshot.user]
+    reflectivity = [static.reflectivity, *(bodies[user].reflectivity for user in snapshot.user)]
+    caster = make_ray_caster(np.concatenate([static.triangles, *placed]), engine)
+    return ReflectiveSurface(caster, np.concatenate(reflectivity)), np.concatenate(owner)
+
+
+def full_scan(scanner: Scanner, surface: ReflectiveSurface, owner: Integer, users: int) -> Scan:
+    """Cast every ray of a sensor against the whole scene."""
+    model, rays = scanner.sensor.model, len(scanner.directions)
+    distance, intensity, reflected = np.full(rays, np.inf), np.zeros(rays), np.zeros(rays)
+    instance = np.full(rays, STATIC_INSTANCE, dtype=np.int32)
+    for begin in range(0, rays, _RAYS_AT_ONCE):
+        directions = scanner.directions[begin : begin + _RAYS_AT_ONCE]
+        far, triangle = surface.caster.cast(scanner.sensor.xyz, directions, model.max_range)
+        hit = np.flatnonzero(triangle >= 0)
+        distance[begin + hit] = far[hit]
+        reflected[begin + hit] = surface.reflected(directions[hit], triangle[hit])
+        intensity[begin + hit] = model.law.intensity(far[hit], reflected[begin + hit])
+        instance[begin + hit] = owner[triangle[hit]]
+    chance = return_chance(model, distance, reflected).astype(np.float32)
+    nobody = np.zeros(users, dtype=np.int64)
+    return Scan(distance, distance, intensity, chance, instance, nobody, nobody)
+
+
+def differing(one: Scan, other: Scan) -> Integer:
+    """Return the rays that do not end at the same distance on the same object."""
+    hit, there = np.isfinite(one.distance), np.isfinite(other.distance)
+    both = hit & there
+    apart = hit != there
+    apart[both] = np.abs(one.distance[both] - other.distance[both]) > SLACK
+    return np.flatnonzero(apart | (one.instance != other.instance))
+
+
+def grazes(origin: Float, direction: Float, triangles: Float, distance: float) -> bool:
+    """Return whether a ray grazes an edge or a surface, so that two engines may disagree on it.
+
+    It passes an edge, or it hits a surface so edge-on that the single precision of the
+    corners moves the full scan's return, while double precision agrees with this one.
+    """
+    return (
+        passes_an_edge(origin, direction, triangles) or abs(exact_hit(origin, direction, triangles) - distance) < SLACK
+    )
+
+
+def exact_hit(origin: Float, direction: Float, triangles: Float) -> float:
+    """Return the distance to the first triangle in double precision (Möller and Trumbore 1997), or infinity."""
+    start, first, second = triangles[:, 0], triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
+    across = np.cross(direction, second)
+    volume = (first * across).sum(axis=1)
+    facing = np.flatnonzero(volume)
+    away, share = origin - start[facing], 1.0 / volume[facing]
+    along = np.cross(away, first[facing])
+    u, v = share * (away * across[facing]).sum(axis=1), share * (along @ direction)
+    far = share * (second[facing] * along).sum(axis=1)
+    return float(far[(u >= 0) & (v >= 0) & (u + v <= 1) & (far > 0)].min(initial=np.inf))
+
+
+def passes_an_edge(origin: Float, direction: Float, triangles: Float) -> bool:
+    """Return whether a ray passes within a tenth of a millimetre of a triangle's edge."""
+    start = np.concatenate([triangles[:, corner] for corner in range(3)]) - origin
+    edge = np.concatenate([triangles[:, (corner + 1) % 3] - triangles[:, corner] for corner in range(3)])
+    aside, across = (part - np.outer(part @ direction, direction) for part in (start, edge))
+    length = np.maximum((across**2).sum(axis=1), np.finfo(float).tiny)
+    share = np.clip(-(aside * across).sum(axis=1) / length, 0, 1)
+    return bool(np.linalg.norm(aside + share[:, None] * across, axis=1).min() < SLACK)
