@@ -88,7 +88,7 @@ def street_plan(extract: Extract, crossings: Sequence[Crossing]) -> StreetPlan:
 
     Within 10 km of the middle, distances are right to 0.2 %.
     """
-    streets = [way for way in extract.ways.values() if "highway" in way.tags and is_street(way.tags)]
+    streets = [way for way in extract.ways.values() if is_street(way.tags)]
     degrees = [
         np.array([(node.latitude, node.longitude) for node in extract.line(way)], dtype=np.float64).reshape(-1, 2)
         for way in streets
