@@ -73,14 +73,15 @@ def test_choices_are_scored_on_runs_that_they_did_not_see(tmp_path):
             row = dict.fromkeys(COLUMNS, "") | {"site": "one", "placement": number, "coverage": seen, "returns": found}
             rows.writerow(row | dict(zip(HALVES["vehicles"], (one, other), strict=True)))
     lost = {name: loss.value for name, loss in choice_losses(path, read_table(path)).items()}
-    # the best of all by the first half has 0.7 in the second, the best by the second 0.3 in the first
-    assert lost["coverage"] == pytest.approx(((0.7 - 0.6) + (0.3 - 0.1)) / 2)
-    assert lost["returns"] == pytest.approx(((0.7 - 0.4) + (0.3 - 0.5)) / 2)
+    # the default is placement 2, with 0.5 in the first half and 0.4 in the second
+    assert lost["returns"] == 0.0
+    assert lost["coverage"] == pytest.approx(((0.4 - 0.6) + (0.5 - 0.1)) / 2)
     # placements 1 and 2: the second is better in the first half, the first in the second
-    assert lost["2 finalists"] == pytest.approx(((0.7 - 0.4) + (0.3 - 0.1)) / 2)
+    assert lost["2 finalists"] == pytest.approx(((0.4 - 0.4) + (0.5 - 0.1)) / 2)
     # coverage ranks 1 2 6 5 4 3, returns 2 4 5 6 3 1: in turn 1, 2, 4, 6
-    assert lost["4 finalists"] == pytest.approx(((0.7 - 0.4) + (0.3 - 0.3)) / 2)
-    assert lost["8 finalists"] == lost["16 finalists"] == pytest.approx(0.0)
+    assert lost["4 finalists"] == pytest.approx(((0.4 - 0.4) + (0.5 - 0.3)) / 2)
+    # of all six, the third is the best in the first half, the fourth in the second
+    assert lost["8 finalists"] == lost["16 finalists"] == pytest.approx(((0.4 - 0.7) + (0.5 - 0.3)) / 2)
     assert "blend" not in lost
     chart = tmp_path / "chart.png"
     save_speed_accuracy_chart(chart, {"coverage": 2.0, "2 finalists": 90.0}, choice_losses(path, read_table(path)), "")

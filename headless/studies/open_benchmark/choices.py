@@ -1,14 +1,10 @@
-r"""What ways of choosing a placement lose in average precision, and the time that they take.
+r"""What ways of choosing a placement lose in average precision against the default, and the time that they take.
 
 A placement that is the best of many by measured average precision (AP) owes some of it to chance. Each choice is
 therefore scored on runs of traffic that it did not see. Let :math:`a_p` be the mean AP of the classes with placement p
 in one half of the runs of a site, and :math:`b_p` that in the other half. A choice that takes placement c loses
-
-.. math::
-    b_{p^*} - b_c, \qquad p^* = \arg\max_p a_p,
-
-against a detector that judged all placements of the table in the first half; the mean of both ways round counts.
-A criterion takes the placement that it likes best; of finalists, the one with the largest :math:`a_p` is taken.
+:math:`b_d - b_c` against the placement d that the default criterion likes best; the mean of both ways round counts. A
+criterion takes the placement that it likes best; of finalists, the one with the largest :math:`a_p` is taken.
 """
 
 from __future__ import annotations
@@ -33,7 +29,9 @@ from .table import CRITERIA, HALVES, Placements, criterion_column, mean_over_sit
 
 FINALISTS = (2, 4, 8, 16)
 """Numbers of finalists that are compared."""
-SHORTLISTS = ("coverage", "returns")
+DEFAULT = "returns"
+"""Criterion against which the others lose or gain."""
+SHORTLISTS = ("coverage", DEFAULT)
 """Criteria of which finalists are the best placements, in turn: those that `seip place` has."""
 BLEND = ("returns", "egvs", "inspe", "pe_vgop")
 """Criteria whose standardised values have a mean that is compared too."""
@@ -46,7 +44,7 @@ TIMED = {
 
 
 def choice_losses(path: Path, table: Placements) -> dict[str, IntervalEstimate]:
-    """Return what each choice loses in mean AP of the classes, the mean over the sites, 0 to 1.
+    """Return what each choice loses in mean AP of the classes against the default, the mean over sites, -1 to 1.
 
     Parameters
     ----------
@@ -58,10 +56,10 @@ def choice_losses(path: Path, table: Placements) -> dict[str, IntervalEstimate]:
     for site, rows in table.items():
         parts = [_mean_precision(path, rows, half) for half in (0, 1)]
         values = {key: column[site] for key, column in columns.items() if site in column}
+        default = int(np.argmax(values[DEFAULT]))
         for name, pool in _pools(values).items():
             losses = [
-                scored[int(np.argmax(judged))] - scored[pool[int(np.argmax(judged[pool]))]]
-                for judged, scored in (parts, parts[::-1])
+                scored[default] - scored[pool[int(np.argmax(judged[pool]))]] for judged, scored in (parts, parts[::-1])
             ]
             lost.setdefault(name, []).append(float(np.mean(losses)))
     return {name: mean_over_sites(np.array(values)) for name, values in lost.items()}
@@ -73,11 +71,9 @@ def _pools(values: Mapping[str, Float]) -> dict[str, Integer]:
     if all(key in values for key in BLEND):
         blend = np.sum([_standardised(values[key]) for key in BLEND], axis=0)
         pools["blend"] = np.array([int(np.argmax(blend))])
-    if all(key in values for key in SHORTLISTS):
-        ranked = [np.argsort(-values[key], kind="stable").tolist() for key in SHORTLISTS]
-        in_turn = np.array(list(dict.fromkeys(chain.from_iterable(zip(*ranked, strict=True)))))
-        pools |= {f"{count} finalists": in_turn[:count] for count in FINALISTS}
-    return pools
+    ranked = [np.argsort(-values[key], kind="stable").tolist() for key in SHORTLISTS]
+    in_turn = np.array(list(dict.fromkeys(chain.from_iterable(zip(*ranked, strict=True)))))
+    return pools | {f"{count} finalists": in_turn[:count] for count in FINALISTS}
 
 
 def _standardised(values: Float) -> Float:
@@ -119,7 +115,7 @@ def save_speed_accuracy_chart(
     Choices without a time, which `seip place` does not make, are lines across the chart.
     """
     figure, (panel,) = new_figure(7.2, 4.6)
-    style_axes(panel, "processor seconds, everything computed anew", "average precision lost, points")
+    style_axes(panel, "processor seconds, everything computed anew", "average precision below the default, points")
     for row, (name, loss) in enumerate(losses.items()):
         value = 100.0 * loss.value
         if name not in seconds:
