@@ -43,7 +43,7 @@ from seip_addon.core.arrays import Boolean, Float
 from seip_addon.core.errors import SeipError
 from seip_addon.core.geometry.plan import outline, surface_height
 from seip_addon.core.limits import Limits
-from seip_addon.core.output.datasets.label_files import CLASSES, read_labels
+from seip_addon.core.output.datasets.formats import CLASSES, read_labels
 from seip_addon.core.output.results.detection_record import RECORDING_SCHEMA
 from seip_addon.core.output.results.versions import versions
 from seip_addon.core.progress import Progress

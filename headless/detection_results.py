@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
 from seip_addon.core.arrays import Float
-from seip_addon.core.output.datasets.detection_files import kitti_results, openpcdet_results
+from seip_addon.core.output.datasets.formats import kitti_results, openpcdet_results
 from seip_addon.core.output.results.detection_record import FORMATS
 from seip_addon.core.sensing.scans.sensor import MountedSensor
 from seip_addon.core.storage.files import whole_file

@@ -164,6 +164,7 @@ def run_network(
         sites=everything,
         curve=curve,
         sensor_types=request.settings.candidates.sensors,
+        sensor_names={key: model.name for key, model in request.settings.models().items()},
         attribution=tuple(sorted({credit for site in good for credit in site.attribution})),
         notes=(OWN_SITE,),
         goal=request.coverage,

@@ -18,7 +18,7 @@ from .viewport.point_cloud import NAME, cloud_overlay
 
 def known_traffic(scene: bpy.types.Scene, files: TrafficFiles, origin: Float) -> Trajectories | None:
     """Return the traffic of files that were read before and are still the same, None otherwise."""
-    own = session.traffic.get(scene.session_uid)
+    own = session.of(scene).traffic
     if own is None or (own.files, own.changed) != (files, changes(files)):
         return None
     return own.trajectories if np.array_equal(own.trajectories.origin, origin) else None
@@ -44,18 +44,18 @@ def measure(run: Run, simulation: Simulation, at: float) -> LastScan:
 
 def keep(scene: bpy.types.Scene, scan: LastScan) -> None:
     """Keep a scan and show its points."""
-    session.scans[scene.session_uid] = scan
+    session.of(scene).scan = scan
     show_cloud(scene)
 
 
 def show_cloud(scene: bpy.types.Scene) -> None:
     """Show the points of a scene's last scan, in the colours that its panel asks for."""
-    scan = session.scan_of(scene)
+    scan = session.of(scene).scan
     if scan is not None:
         overlays.show(scene, NAME, cloud_overlay(scan.frame, scan.run.sensors, scene.seip.view.cloud_colour))
 
 
 def hide_cloud(scene: bpy.types.Scene) -> None:
     """Let go of a scene's scan."""
-    session.scans.pop(scene.session_uid, None)
+    session.of(scene).scan = None
     overlays.hide(scene, NAME)

@@ -52,20 +52,23 @@ def stop() -> None:
 
 def update() -> None:
     """Cast the rays of the sensors that moved and colour the road again."""
-    if session.following is None:
+    followed = session.following
+    if followed is None:
         return
     try:
-        _update(session.following, scene_of(session.following.scene))
-        session.following.problem = ""
+        scene = scene_of(followed.scene)
+        if followed.state.record != scene.seip.result.record:  # undo has brought back another placement
+            stop()
+            return
+        _update(followed, scene)
+        followed.problem = ""
     except SeipError as error:
-        session.following.problem = str(error)
+        followed.problem = str(error)
 
 
 def _update(followed: FollowedSensors, scene: bpy.types.Scene) -> None:
     if followed.state.watch.changed:
         raise SeipError("the scene has changed: place again, or turn this off")
-    if followed.state.record != scene.seip.result.record:
-        raise SeipError("this is another placement: turn this off and on again")
     sensors = {sensor.label: sensor for sensor in read_sensors(scene, preferences.catalogue())}
     for label in [label for label in followed.sensors if label not in sensors]:
         del followed.sensors[label]
@@ -135,6 +138,4 @@ def _handlers() -> tuple[tuple[str, Callable[..., None]], ...]:
     return (("depsgraph_update_post", _on_update), ("undo_post", _on_undo), ("redo_post", _on_undo))
 
 
-def forget() -> None:
-    """Follow no sensors: another file is opened, or the add-on is disabled."""
-    stop()
+forget = stop  # another file is opened, or the add-on is disabled

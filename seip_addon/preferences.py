@@ -170,16 +170,6 @@ def kept_visibility() -> GridFolder:
     return GridFolder(cache_folder())
 
 
-def empty_cache() -> int:
-    """Delete all visibility that is kept, and return how many files there were."""
-    return kept_visibility().empty()
-
-
-def why_not_empty() -> str:
-    """Say why the cache cannot be emptied, or nothing."""
-    return "" if kept_visibility().megabytes() else "The cache is empty"
-
-
 def own() -> bpy.types.AddonPreferences | None:
     """Return the add-on's preferences; None where it was not enabled as an add-on."""
     add_on = bpy.context.preferences.addons.get(ADDON_ID)

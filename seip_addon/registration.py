@@ -7,16 +7,16 @@ import bpy
 
 PARTS = (
     "panels.preferences",
-    "properties.site", "properties.survey", "properties.placement", "properties.results", "properties.view",
-    "properties.traffic", "properties.simulation", "properties.detection", "properties.verification",
+    "properties.site", "properties.survey", "properties.placement",
+    "properties.traffic", "properties.simulation",
     "properties.sections", "properties.scene",
     "session", "scene_survey", "sensor_types", "loose_pieces",
     "viewport.beam_preview", "viewport.overlays", "viewport.coverage",
-    "operators.base", "operators.sumo", "operators.site", "operators.street_map",
-    "operators.sensors", "operators.visibility", "operators.placement", "live_coverage",
+    "operators.base", "operators.site", "operators.street_map",
+    "operators.sensors", "operators.placement", "live_coverage",
     "operators.results", "operators.view", "operators.traffic", "operators.simulation", "operators.detection",
     "operators.verification",
-    "panels.sensor_table", "panels.placement", "panels.results", "panels.steps", "panels.front_door",
+    "panels.sensors", "panels.site", "panels.placement", "panels.results", "panels.steps", "panels.front_door",
 )  # fmt: skip
 """Modules of the add-on; most have ``CLASSES``.
 

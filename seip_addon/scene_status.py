@@ -13,6 +13,7 @@ from .core.errors import SeipError
 from .core.output.results.placement_file import parsed_record
 from .core.workflows.survey_settings import SurveySettings
 from .scene import contract
+from .scene.sensors import labelled_sensors
 from .session import session
 
 FILE_VERSION = 1
@@ -23,6 +24,7 @@ LINKED = "This scene is linked from another file: open that file to work on it."
 NOT_COMPARED = "Not compared with the scene since the file was opened."
 ANOTHER_SITE = "The scene or its settings have changed since this placement: place again."
 NO_SITE = "There is no site yet."
+UNEVALUATED = "There are sensors without figures in the scene: evaluate them."
 OLD_CHECK = "Checked before the file was opened: check again."
 
 
@@ -53,20 +55,30 @@ def has_nothing(scene: bpy.types.Scene) -> bool:
     return not any(contract.has_members(scene, name) for name in (contract.REGION, contract.ROADS))
 
 
+def has_unevaluated(scene: bpy.types.Scene) -> bool:
+    """Return whether there are sensors without a placement, as in a file that a command wrote."""
+    return not scene.seip.result.record and bool(labelled_sensors(scene, hidden=True))
+
+
 def next_step(scene: bpy.types.Scene) -> str:
     """Return the operator, by its ``bl_idname``, that comes next on the way to placed sensors; empty at its end."""
-    site = scene.seip.site
     if not_own(scene) or is_newer(scene):
         return ""
     if scene.seip.result.record:
         return "seip.solve_placement" if other_goal(scene) else ""
     if obstacle(scene):
-        if site.has_place():
-            return "seip.build_site"
-        return "seip.download_map" if site.new_site and not site.source else "seip.choose_map"
-    if not site.checked:
+        return _next_for_site(scene.seip.site)
+    if has_unevaluated(scene):
+        return "seip.evaluate_sensors"
+    if not scene.seip.site.checked:
         return "seip.check_site"
     return "seip.solve_placement" if scene.seip.survey.used_types() else "seip.choose_sensors"
+
+
+def _next_for_site(site: bpy.types.PropertyGroup) -> str:
+    if site.has_place():
+        return "seip.build_site"
+    return "seip.download_map" if site.new_site and not site.source else "seip.choose_map"
 
 
 def current_step(scene: bpy.types.Scene) -> str:
@@ -74,12 +86,13 @@ def current_step(scene: bpy.types.Scene) -> str:
     operator = next_step(scene)
     if operator == "seip.choose_sensors":
         return "sensors"
-    return "placement" if operator in {"", "seip.solve_placement"} and not has_nothing(scene) else "site"
+    is_last = operator in {"", "seip.solve_placement", "seip.evaluate_sensors"}
+    return "placement" if is_last and not has_nothing(scene) else "site"
 
 
 def search_seconds(scene: bpy.types.Scene) -> float | None:
     """Return an approximate upper limit of the time of a search in seconds; None if visibility is not computed yet."""
-    state = session.state_of(scene)
+    state = session.of(scene).state
     if state is None or state.survey is None or stale_survey(scene):
         return None
     return float(scene.seip.survey.effort)
@@ -87,7 +100,7 @@ def search_seconds(scene: bpy.types.Scene) -> float | None:
 
 def stale_survey(scene: bpy.types.Scene) -> str:
     """Return why the survey of a scene is not of the scene as it is, in a sentence; empty if it is."""
-    state = session.state_of(scene)
+    state = session.of(scene).state
     if state is None:
         return ""
     if state.watch.changed:
@@ -101,7 +114,7 @@ def stale_survey(scene: bpy.types.Scene) -> str:
 
 def stale_placement(scene: bpy.types.Scene) -> str:
     """Return why the scene's placement is not of the scene as it is, in a sentence; empty if it is."""
-    state = session.state_of(scene)
+    state = session.of(scene).state
     if state is None:
         return NOT_COMPARED
     record = parsed_record(scene.seip.result.record)
@@ -119,7 +132,7 @@ def other_goal(scene: bpy.types.Scene) -> str:
 
 def stale_check(scene: bpy.types.Scene) -> str:
     """Return why the scene's check is not of the scene as it is, in a sentence; empty if it is."""
-    check = session.checks.get(scene.session_uid)
+    check = session.of(scene).check
     if check is None:
         return OLD_CHECK
     if check.watch.changed:

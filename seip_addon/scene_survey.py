@@ -23,10 +23,12 @@ from .core.progress import Progress
 from .core.workflows.records import inputs_of, restored_solution
 from .core.workflows.survey import Survey, lay_out, see
 from .core.workflows.survey_settings import SurveySettings
-from .scene.changes import Watch, on_update, watch
+from .scene import changes
+from .scene.changes import Watch, watch
 from .scene.read import SceneReading, read_scene
 from .scene_status import FILE_VERSION, obstacle, same_grid
 from .session import Resources, SceneState, session
+from .viewport import overlays
 
 LOAD_DELAY = 0.2
 """Seconds from the opening of a file to the work on it."""
@@ -44,7 +46,7 @@ def survey(scene: bpy.types.Scene) -> Generator[Progress, None, SceneState]:
     settings.models()  # refuses before the scene is read
     catalogues = tuple((path, path.stat().st_mtime_ns) for path in settings.catalogue)
     resources = Resources(preferences.cache_folder(), preferences.cores())
-    state = session.state_of(scene)
+    state = session.of(scene).state
     if state is not None and not state.watch.look(scene) and state.catalogues == catalogues:
         if same_grid(settings, state.layout.settings):
             layout = replace(state.layout, settings=settings)
@@ -66,6 +68,14 @@ def with_visibility(state: SceneState) -> Generator[Progress, None, tuple[SceneS
     file = state.resources.grid_file(state.inputs["visibility"])
     survey = yield from see(state.layout, file, threads=state.resources.cores)
     return replace(state, layout=survey, durations=state.timed("visibility", began)), survey
+
+
+def with_visibility_of(
+    surveying: Generator[Progress, None, SceneState],
+) -> Generator[Progress, None, tuple[SceneState, Survey]]:
+    """Do the work of `survey`, and that of `with_visibility` on its result."""
+    state = yield from surveying
+    return (yield from with_visibility(state))
 
 
 def with_placement(scene: bpy.types.Scene) -> Generator[Progress, None, SceneState]:
@@ -139,7 +149,7 @@ def _compare() -> None:
     """Compare each window's scene with its placement, one: there is one piece of work at a time."""
     for window in bpy.context.window_manager.windows:
         scene = window.scene
-        unknown = session.state_of(scene) is None and scene.seip.result.record
+        unknown = session.of(scene).state is None and scene.seip.result.record
         if session.running is None and unknown and not obstacle(scene):
             with (
                 bpy.context.temp_override(window=window),
@@ -157,7 +167,27 @@ def _before_save(*_: object) -> None:
             scene.seip.version = FILE_VERSION
 
 
-HANDLERS = (("load_post", _after_load), ("save_pre", _before_save), ("depsgraph_update_post", on_update))
+@bpy.app.handlers.persistent  # type: ignore[untyped-decorator]
+def _after_undo(*_: object) -> None:
+    """Look soon whether scenes are as they were when they were read: Blender is not ready for work yet."""
+    if not bpy.app.timers.is_registered(look_again):
+        bpy.app.timers.register(look_again, first_interval=0.0)
+
+
+def look_again() -> None:
+    """Look whether scenes are as they were when they were read, and draw that in the panel."""
+    for scene in bpy.data.scenes:
+        changes.look_again(scene)
+    overlays.redraw()
+
+
+HANDLERS = (
+    ("load_post", _after_load),
+    ("save_pre", _before_save),
+    ("depsgraph_update_post", changes.on_update),
+    ("undo_post", _after_undo),
+    ("redo_post", _after_undo),
+)
 
 
 def attach() -> None:
@@ -171,5 +201,6 @@ def detach() -> None:
     """Watch no longer."""
     for event, handler in HANDLERS:
         getattr(bpy.app.handlers, event).remove(handler)
-    if bpy.app.timers.is_registered(_compare):
-        bpy.app.timers.unregister(_compare)
+    for timer in (_compare, look_again):
+        if bpy.app.timers.is_registered(timer):
+            bpy.app.timers.unregister(timer)

@@ -23,7 +23,7 @@ def select_sensor(result: bpy.types.PropertyGroup, context: bpy.types.Context) -
 def search_positions(_goal: bpy.types.PropertyGroup, context: bpy.types.Context, text: str) -> Iterator[str]:
     """Yield the names of positions that hold a text: those that were laid out, or else the poles."""
     scene = context.scene
-    state = session.state_of(scene)
+    state = session.of(scene).state
     if state is not None:
         names = state.layout.site.candidates.position_name.tolist()
     else:

@@ -2,11 +2,13 @@
 
 import bpy
 
-from . import preferences
+from . import preferences, scene_status
 from .core.errors import SeipError
 from .core.sensing.lidar.catalogue import load_catalogue
 from .core.sensing.lidar.model import LidarModel
 from .core.site.candidates import DEFAULT_TYPE
+from .scene import contract
+from .scene.sensors import labelled_sensors
 from .session import session
 
 PAPER = "generic"
@@ -57,7 +59,14 @@ def list_types(scene: bpy.types.Scene) -> None:
 
 @bpy.app.handlers.persistent  # type: ignore[untyped-decorator]
 def _after_load(*_: object) -> None:
+    """List the types; where a command has placed sensors, use their types if none of them was chosen."""
     refresh()
+    for scene in bpy.data.scenes:
+        if scene.library is None and scene_status.has_unevaluated(scene):
+            there = {obj.get(contract.SENSOR) for obj in labelled_sensors(scene, hidden=True).values()}
+            if not there & set(scene.seip.survey.used_types()):
+                for one in scene.seip.survey.types:
+                    one.use = one.name in there
 
 
 def attach() -> None:

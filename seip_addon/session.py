@@ -258,13 +258,24 @@ class LastVerification:
 
 
 @dataclass
+class SceneMemory:
+    """What is known of a scene: its state, check, traffic, last scan and last verification."""
+
+    state: SceneState | None = None
+    check: CheckedScene | None = None
+    traffic: SceneTraffic | None = None
+    scan: LastScan | None = None
+    verification: LastVerification | None = None
+
+
+@dataclass
 class Session:
-    """All that the add-on keeps in memory; by scene, under the scene's session number.
+    """All that the add-on keeps in memory.
 
     Parameters
     ----------
-    states, checks, traffic, scans, verifications : dict
-        State, checks, traffic, scans and last verification of each scene.
+    scenes : dict of int to SceneMemory
+        By the scene's session number.
     overlays : dict of int to dict of str to Overlay
         What is drawn in the views of each scene, by name.
     sensor_types : dict of str to LidarModel
@@ -279,11 +290,7 @@ class Session:
         Junctions of the file that was read last, to choose from.
     """
 
-    states: dict[int, SceneState] = field(default_factory=dict)
-    checks: dict[int, CheckedScene] = field(default_factory=dict)
-    traffic: dict[int, SceneTraffic] = field(default_factory=dict)
-    scans: dict[int, LastScan] = field(default_factory=dict)
-    verifications: dict[int, LastVerification] = field(default_factory=dict)
+    scenes: dict[int, SceneMemory] = field(default_factory=dict)
     overlays: dict[int, dict[str, Overlay]] = field(default_factory=dict)
     sensor_types: dict[str, LidarModel] = field(default_factory=dict)
     catalogue_error: str = ""
@@ -291,21 +298,9 @@ class Session:
     following: FollowedSensors | None = None
     places: SitePlaces | None = None
 
-    def state_of(self, scene: bpy.types.Scene) -> SceneState | None:
-        """Return what is known of a scene, or None."""
-        return self.states.get(scene.session_uid)
-
-    def keep_state(self, scene: bpy.types.Scene, state: SceneState) -> None:
-        """Keep what work has found of a scene, in place of what was known: for the main thread, once it has ended."""
-        self.states[scene.session_uid] = state
-
-    def scan_of(self, scene: bpy.types.Scene) -> LastScan | None:
-        """Return the last scan of a scene, None where there is none."""
-        return self.scans.get(scene.session_uid)
-
-    def verification_of(self, scene: bpy.types.Scene) -> LastVerification | None:
-        """Return the last verification of a scene, None where there is none."""
-        return self.verifications.get(scene.session_uid)
+    def of(self, scene: bpy.types.Scene) -> SceneMemory:
+        """Return what is known of a scene; work that has ended stores there what it has found, on the main thread."""
+        return self.scenes.setdefault(scene.session_uid, SceneMemory())
 
 
 session = Session()  # there is one Blender, and one file open in it
@@ -327,8 +322,7 @@ def scene_of(number: int) -> bpy.types.Scene:
 
 def forget() -> None:
     """Let go of what is known of the open file, and have work that is under way end."""
-    for kept in (session.states, session.checks, session.traffic, session.scans, session.verifications):
-        kept.clear()
+    session.scenes.clear()
     session.places = None
     if session.running is not None:
         session.running.stop = True

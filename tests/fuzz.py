@@ -481,7 +481,7 @@ def _read_sweep(path: Path, _: bytes) -> None:
 
 
 def _sensor_poses(_: Path) -> list[bytes]:
-    from seip_addon.core.output.datasets.kitti import CALIBRATION  # noqa: PLC0415
+    from seip_addon.core.output.datasets.formats import CALIBRATION  # noqa: PLC0415
 
     rows = [[0.0, -1.0, 0.0, 12.5], [1.0, 0.0, 0.0, -3.25], [0.0, 0.0, 1.0, 6.0], [0.0, 0.0, 0.0, 1.0]]
     turned = {"rotation": [row[:3] for row in rows[:3]], "translation": [row[3:] for row in rows[:3]]}
@@ -501,7 +501,7 @@ def _read_poses(path: Path, _: bytes) -> None:
 
 
 def _box_labels(_: Path) -> list[bytes]:
-    from seip_addon.core.output.datasets.detection_files import kitti_results, openpcdet_results  # noqa: PLC0415
+    from seip_addon.core.output.datasets.formats import kitti_results, openpcdet_results  # noqa: PLC0415
     from tests.builders.recording_files import dair_text, openlabel_text  # noqa: PLC0415
 
     kinds = ["car", "bus", "pedestrian"]

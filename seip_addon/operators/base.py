@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Callable, Generator
 from typing import Generic, TypeVar
 
@@ -19,7 +20,10 @@ from ..session import RunningWork, scene_of, session
 
 Result = TypeVar("Result")
 Outcome = set[str]
+Obstacles = tuple[Callable[[bpy.types.Scene], str], ...]
 
+REPORT_WIDTH = 72
+"""Letters in a line of an error."""
 TIMER_INTERVAL = 0.1
 """Seconds between timer events while work is running."""
 SHOW_INTERVAL = 1.0
@@ -34,12 +38,17 @@ def attempt(operator: bpy.types.Operator, work: Callable[[], None]) -> Outcome:
     try:
         work()
     except SeipError as error:
-        operator.report({"ERROR"}, str(error))
+        _report(operator, str(error))
         return {"CANCELLED"}
     except ImportError as error:  # some packages are imported on first use
-        operator.report({"ERROR"}, f"a package of the extension is missing or broken ({error}): install its zip again")
+        _report(operator, f"a package of the extension is missing or broken ({error}): install its zip again")
         return {"CANCELLED"}
     return {"FINISHED"}
+
+
+def _report(operator: bpy.types.Operator, text: str) -> None:
+    """Report an error; Blender shows it in a window of its own, as wide as its longest line."""
+    operator.report({"ERROR"}, text if bpy.app.background else "\n".join(textwrap.wrap(text, REPORT_WIDTH)))
 
 
 def started(steps: Generator[Progress, None, Result]) -> Generator[Progress, None, Result]:
@@ -51,10 +60,13 @@ def started(steps: Generator[Progress, None, Result]) -> Generator[Progress, Non
 class Conditional:
     """Mixin for operators that are disabled for a reason, which their tooltip states."""
 
+    obstacles: Obstacles = ()
+    """Functions that return a reason why the operator is disabled in a scene, or ""."""
+
     @classmethod
     def why_not(cls, context: bpy.types.Context) -> str:
-        """Return the reason why the operator is disabled, as a sentence; empty if it is enabled."""
-        raise NotImplementedError
+        """Return the first reason why the operator is disabled, as a sentence; empty if it is enabled."""
+        return next(filter(None, (obstacle(context.scene) for obstacle in cls.obstacles)), "")
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -68,10 +80,19 @@ class Conditional:
 class ForReadyScene(Conditional):
     """Mixin that enables an operator only where the scene has all inputs of a computation."""
 
-    @classmethod
-    def why_not(cls, context: bpy.types.Context) -> str:
-        """Return a reason if an input is missing, or the scene belongs to another file or version."""
-        return scene_status.obstacle(context.scene)
+    obstacles: Obstacles = (scene_status.obstacle,)
+
+
+class ShortWork:
+    """Mixin for operators that are done at once: an error is reported to the user."""
+
+    def act(self, context: bpy.types.Context) -> None:
+        """Do the work, or raise a `SeipError`."""
+        raise NotImplementedError
+
+    def execute(self, context: bpy.types.Context) -> Outcome:
+        """Do the work, and report an error."""
+        return attempt(self, lambda: self.act(context))
 
 
 class LongWork(Generic[Result]):
@@ -188,10 +209,7 @@ class SEIP_OT_stop(Conditional, bpy.types.Operator):
     bl_idname = "seip.stop"
     bl_label = "Stop"
 
-    @classmethod
-    def why_not(cls, _context: bpy.types.Context) -> str:
-        """Return a reason if no work is running."""
-        return "nothing is under way" if session.running is None else ""
+    obstacles = (lambda _: "nothing is under way" if session.running is None else "",)
 
     def execute(self, _context: bpy.types.Context) -> Outcome:
         """Ask the work to stop."""

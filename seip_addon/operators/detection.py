@@ -23,14 +23,19 @@ from ..scene.sensors import labelled_sensors, pose_of
 from .base import Conditional, LongWork, started
 
 NO_SENSORS = "There is no sensor to detect road users with: place sensors first."
-NO_PYTHON = f"Detection needs a Python with PyTorch: {INSTALL}, and name its Python in the extension's preferences."
+NO_PYTHON = f"Detection needs a Python with PyTorch, named in the extension's preferences: {INSTALL}."
 
 
 def why_no_detection(scene: bpy.types.Scene) -> str:
     """Return why nothing can be detected; nothing where it can."""
     if not labelled_sensors(scene):
         return NO_SENSORS
-    return scene_status.obstacle(scene) or ("" if preferences.detecting_python() is not None else NO_PYTHON)
+    return scene_status.obstacle(scene) or no_python(scene)
+
+
+def no_python(_scene: bpy.types.Scene) -> str:
+    """Return that there is no Python for detection, or ""."""
+    return "" if preferences.detecting_python() is not None else NO_PYTHON
 
 
 def sensors_key(scene: bpy.types.Scene) -> str:
@@ -49,10 +54,7 @@ class SEIP_OT_detect(Conditional, LongWork[str], bpy.types.Operator):
     bl_label = "Detect"
     stopped_message = "stopped; nothing was written"
 
-    @classmethod
-    def why_not(cls, context: bpy.types.Context) -> str:
-        """Return a reason if sensors or a Python with PyTorch are missing."""
-        return why_no_detection(context.scene)
+    obstacles = (why_no_detection,)
 
     def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, str]:
         """Save the scene as it is, for the process that detects."""

@@ -1,4 +1,4 @@
-"""Operators that solve a placement and edit its constraints."""
+"""Operators that compute visibility, solve a placement, compare it with its scene, and edit its constraints."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Literal
 
 import bpy
 
 from .. import preferences, scene_status, scene_survey, selection
 from ..core.acceptance import Acceptance
 from ..core.choosing.placement.objective import Objective, check_objective
+from ..core.counts import counted
 from ..core.errors import SeipError
 from ..core.output.results.answer import answer
 from ..core.output.results.placement_record import Provenance
@@ -25,15 +25,52 @@ from ..core.workflows.detection import DetectionJob
 from ..core.workflows.finalists import check_judged, find_finalists, judge_elsewhere, judged_solution
 from ..core.workflows.placing import place, with_context
 from ..core.workflows.records import record_of
+from ..core.workflows.survey import Survey
 from ..core.workflows.traffic_runs import found_runs, read_runs
 from ..properties.conversion import output_folder, runs_folder
 from ..scene.blend_file import save_blend
 from ..scene.write import write_result
-from ..session import SceneState
+from ..session import SceneState, session
 from ..viewport import coverage
-from .base import Conditional, ForReadyScene, LongWork, Outcome, attempt, started
-from .detection import NO_PYTHON, folder_of_result
+from .base import Conditional, ForReadyScene, LongWork, Outcome, ShortWork, started
+from .detection import NO_PYTHON, folder_of_result, no_python
 from .results import keep_result
+
+
+class SEIP_OT_compute_visibility(ForReadyScene, LongWork[tuple[SceneState, Survey]], bpy.types.Operator):
+    """Compute which targets on the road are visible from each candidate pose"""
+
+    bl_idname = "seip.compute_visibility"
+    bl_label = "Compute Visibility"
+    bl_options = {"REGISTER"}  # nothing in the file changes
+
+    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, tuple[SceneState, Survey]]:
+        """Read the scene where it has changed."""
+        return scene_survey.with_visibility_of(scene_survey.survey(scene))
+
+    def conclude(self, scene: bpy.types.Scene, result: tuple[SceneState, Survey]) -> None:
+        """Hold the grid."""
+        state, survey = result
+        session.of(scene).state = state
+        site = survey.site
+        targets, poses = counted(len(site.targets), "target"), counted(len(site.candidates), "pose")
+        self.report({"INFO"}, f"visibility of {targets} from {poses} is known")
+
+
+class SEIP_OT_compare_scene(ForReadyScene, LongWork[SceneState], bpy.types.Operator):
+    """Check whether the placement still matches the scene"""
+
+    bl_idname = "seip.compare_scene"
+    bl_label = "Compare with Scene"
+    bl_options = {"REGISTER"}  # nothing in the file changes
+
+    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, SceneState]:
+        """Read the scene where it has changed."""
+        return scene_survey.survey(scene)
+
+    def conclude(self, scene: bpy.types.Scene, result: SceneState) -> None:
+        """Hold what was read: the panel compares."""
+        session.of(scene).state = result
 
 
 class _Placing(LongWork[SceneState]):
@@ -71,10 +108,7 @@ class SEIP_OT_judge_placement(Conditional, _Placing, bpy.types.Operator):
     bl_idname = "seip.judge_placement"
     bl_label = "Judge by Detection"
 
-    @classmethod
-    def why_not(cls, context: bpy.types.Context) -> str:
-        """Return a reason if an input of a placement, or a Python with PyTorch, is missing."""
-        return scene_status.obstacle(context.scene) or ("" if preferences.detecting_python() is not None else NO_PYTHON)
+    obstacles = (scene_status.obstacle, no_python)
 
     def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, SceneState]:
         """Read the scene where it has changed, save it for the process that judges, and state the objective."""
@@ -147,7 +181,7 @@ class SEIP_OT_choose_number(bpy.types.Operator):
         return {"FINISHED"}
 
 
-class SEIP_OT_add_rule(bpy.types.Operator):
+class SEIP_OT_add_rule(ShortWork, bpy.types.Operator):
     """Require or forbid a sensor at the position of the selected pole or sensor, or at the named one"""
 
     bl_idname = "seip.add_rule"
@@ -160,11 +194,9 @@ class SEIP_OT_add_rule(bpy.types.Operator):
         items=(("MANDATORY", "Sensor", "There must be a sensor"), ("FORBIDDEN", "No sensor", "There must be none")),
     )
 
-    def execute(self, context: bpy.types.Context) -> Outcome:
+    def act(self, context: bpy.types.Context) -> None:
         """Add it, or change the one that is there."""
-        return attempt(self, lambda: self._add(context, self.rule))
-
-    def _add(self, context: bpy.types.Context, rule: Literal["MANDATORY", "FORBIDDEN"]) -> None:
+        rule = self.rule
         goal = context.scene.seip.goal
         name = goal.position or selection.position_of(context.scene, context.object)
         if not name:
@@ -175,31 +207,11 @@ class SEIP_OT_add_rule(bpy.types.Operator):
         goal.position = ""
 
 
-class SEIP_OT_remove_rule(bpy.types.Operator):
-    """Remove the rule from the list"""
-
-    bl_idname = "seip.remove_rule"
-    bl_label = "Remove Rule"
-    bl_options = {"REGISTER", "UNDO"}
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """Return whether there is a rule to remove."""
-        goal = context.scene.seip.goal
-        return goal.active_rule in range(len(goal.rules))
-
-    def execute(self, context: bpy.types.Context) -> Outcome:
-        """Remove the active one."""
-        goal = context.scene.seip.goal
-        goal.rules.remove(goal.active_rule)
-        goal.active_rule = max(0, goal.active_rule - 1)
-        return {"FINISHED"}
-
-
 CLASSES = (
+    SEIP_OT_compute_visibility,
+    SEIP_OT_compare_scene,
     SEIP_OT_solve_placement,
     SEIP_OT_judge_placement,
     SEIP_OT_choose_number,
     SEIP_OT_add_rule,
-    SEIP_OT_remove_rule,
 )

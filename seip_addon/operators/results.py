@@ -44,7 +44,7 @@ from ..scene.sensors import labelled_sensors, placed_sensors, read_sensors
 from ..scene.write import coverage_of, shown_legend, take_over
 from ..sensor_edits import position_names, sensor_edits
 from ..session import SceneState, session
-from .base import ForReadyScene, LongWork, Outcome, Result, attempt, started
+from .base import ForReadyScene, LongWork, Obstacles, Outcome, Result, ShortWork, started
 
 OTHER_TARGETS = "The two placements were made on different targets: only their figures can be compared."
 PLAN, REPORT = "plan.png", REPORT_FILES[0]
@@ -56,26 +56,24 @@ EYE_DISTANCE = 10.0
 _Following = tuple[SceneState, VisibilityModel, SensorReturns | None]  # what following sensors needs
 
 
-class ForPlacement(ForReadyScene):
-    """Mixin that enables an operator only where the scene has a placement."""
-
-    @classmethod
-    def why_not(cls, context: bpy.types.Context) -> str:
-        """Return a reason if an input of a placement is missing, or there is no placement."""
-        return super().why_not(context) or no_placement(context.scene)
-
-
 def no_placement(scene: bpy.types.Scene) -> str:
     """Say that there is no placement that can be shown; empty if there is one."""
     if scene_status.is_newer(scene):
         return scene_status.NEWER
     if not scene.seip.result.record:
-        return "There is no placement yet: place sensors first."
+        missing = "There is no placement yet: place sensors first."
+        return scene_status.UNEVALUATED if scene_status.has_unevaluated(scene) else missing
     try:
         parsed_record(scene.seip.result.record)
     except SeipError as error:
         return str(error)
     return ""
+
+
+class ForPlacement(ForReadyScene):
+    """Mixin that enables an operator only where the scene has a placement."""
+
+    obstacles: Obstacles = (*ForReadyScene.obstacles, no_placement)
 
 
 def no_folder(scene: bpy.types.Scene) -> str:
@@ -88,17 +86,20 @@ def no_folder(scene: bpy.types.Scene) -> str:
     return f"Save the file, or choose another folder: {folder[2:] or 'this one'} is beside the file."
 
 
-class SEIP_OT_look_from_sensor(ForPlacement, bpy.types.Operator):
+def not_evaluated(scene: bpy.types.Scene) -> str:
+    """Say what was done by hand to the sensors since they were placed or evaluated; empty if nothing was."""
+    sentence = sensor_edits(scene).describe()
+    return f"{sentence} Press Evaluate Sensors, or undo." if sentence else ""
+
+
+class SEIP_OT_look_from_sensor(ForPlacement, ShortWork, bpy.types.Operator):
     """Look from the sensor that is active in the list towards the road"""
 
     bl_idname = "seip.look_from_sensor"
     bl_label = "View from Sensor"
 
-    def execute(self, context: bpy.types.Context) -> Outcome:
+    def act(self, context: bpy.types.Context) -> None:
         """Set the view."""
-        return attempt(self, lambda: self._look(context))
-
-    def _look(self, context: bpy.types.Context) -> None:
         result = context.scene.seip.result
         label = result.sensors[result.active_sensor].name if result.sensors else ""
         empty = placed_sensors(context.scene).get(label)
@@ -131,10 +132,7 @@ class SEIP_OT_keep_placement(ForPlacement, bpy.types.Operator):
 
     name: bpy.props.StringProperty(name="Name", description="Name of the kept placement; numbered if empty")
 
-    @classmethod
-    def why_not(cls, context: bpy.types.Context) -> str:
-        """Return a reason if there is no placement, or sensors were moved since."""
-        return super().why_not(context) or not_evaluated(context.scene)
+    obstacles = (*ForPlacement.obstacles, not_evaluated)
 
     def execute(self, context: bpy.types.Context) -> Outcome:
         """Keep it, in place of another of that name."""
@@ -158,28 +156,34 @@ def _free_name(taken: set[str]) -> str:
     return next(name for name in (f"Placement {n}" for n in range(1, len(taken) + 2)) if name not in taken)
 
 
-class SEIP_OT_drop_placement(bpy.types.Operator):
-    """Remove the kept placement that is active in the list"""
+class SEIP_OT_remove_entry(bpy.types.Operator):
+    """Remove the active entry of the list"""
 
-    bl_idname = "seip.drop_placement"
-    bl_label = "Remove Kept Placement"
+    bl_idname = "seip.remove_entry"
+    bl_label = "Remove"
     bl_options = {"REGISTER", "UNDO"}
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """Return whether there is one."""
-        seip = context.scene.seip
-        return seip.active_kept in range(len(seip.kept))
+    of: bpy.props.EnumProperty(
+        name="List",
+        description="List that the entry is removed from",
+        items=(("RULES", "Rules", "Positions with a rule"), ("KEPT", "Placements", "Placements that were kept")),
+    )
 
     def execute(self, context: bpy.types.Context) -> Outcome:
-        """Remove it from the list."""
+        """Remove it, if there is one."""
         seip = context.scene.seip
-        seip.kept.remove(seip.active_kept)
-        seip.active_kept = max(0, seip.active_kept - 1)
+        owner, entries, active = (seip.goal, seip.goal.rules, "active_rule")
+        if self.of == "KEPT":
+            owner, entries, active = (seip, seip.kept, "active_kept")
+        number = getattr(owner, active)
+        if number not in range(len(entries)):
+            return {"CANCELLED"}
+        entries.remove(number)
+        setattr(owner, active, max(0, number - 1))
         return {"FINISHED"}
 
 
-class SEIP_OT_show_comparison(ForPlacement, bpy.types.Operator):
+class SEIP_OT_show_comparison(ForPlacement, ShortWork, bpy.types.Operator):
     """Colour the road by the placements that see it: both, only the kept one, only the present one or neither"""
 
     bl_idname = "seip.show_comparison"
@@ -190,11 +194,9 @@ class SEIP_OT_show_comparison(ForPlacement, bpy.types.Operator):
         name="Back", description="Show the coverage of the present placement again", default=False
     )
 
-    def execute(self, context: bpy.types.Context) -> Outcome:
+    def act(self, context: bpy.types.Context) -> None:
         """Colour the road."""
-        return attempt(self, lambda: self._show(context.scene))
-
-    def _show(self, scene: bpy.types.Scene) -> None:
+        scene = context.scene
         seip = scene.seip
         present = unpacked_counts(seip.result.seen)
         if self.back:
@@ -236,7 +238,7 @@ class SEIP_OT_follow_sensors(ForPlacement, LongWork[_Following], bpy.types.Opera
     def conclude(self, scene: bpy.types.Scene, result: _Following) -> None:
         """Begin to follow."""
         state, model, returns = result
-        session.keep_state(scene, state)
+        session.of(scene).state = state
         live_coverage.start(scene, state, model, returns)
 
 
@@ -250,26 +252,34 @@ def _set_up(finding: Generator[Progress, None, SceneState]) -> Generator[Progres
     return state, visibility, SensorReturns(state.layout, solution.objective) if of_returns else None
 
 
-class SEIP_OT_evaluate_sensors(ForPlacement, LongWork[SceneState], bpy.types.Operator):
+def _nothing_to_evaluate(scene: bpy.types.Scene) -> str:
+    return "" if scene_status.has_unevaluated(scene) else no_placement(scene)
+
+
+class SEIP_OT_evaluate_sensors(ForReadyScene, LongWork[SceneState], bpy.types.Operator):
     """Evaluate the sensors of the scene at their present poses, and make them the placement"""
 
     bl_idname = "seip.evaluate_sensors"
-    bl_label = "Evaluate Moved Sensors"
+    bl_label = "Evaluate Sensors"
+
+    obstacles = (
+        *ForReadyScene.obstacles,
+        lambda scene: "" if scene_status.has_unevaluated(scene) else no_placement(scene),
+    )
 
     def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, SceneState]:
-        """Read the poses of the sensors."""
+        """Read the poses of the sensors; those without a placement are evaluated under the goal of the panel."""
         mounted = read_sensors(scene, preferences.catalogue(), hidden=True)
-        return _evaluated(
-            scene_survey.with_grid_of_placement(scene),
-            parsed_record(scene.seip.result.record).request.goal,
-            mounted,
-            position_names(scene),
-        )
+        text, names = scene.seip.result.record, position_names(scene)
+        if not text:
+            surveying = scene_survey.with_visibility_of(scene_survey.survey(scene))
+            return _evaluated(surveying, scene.seip.goal.objective(), mounted, names)
+        goal = parsed_record(text).request.goal
+        return _evaluated(scene_survey.with_grid_of_placement(scene), goal, mounted, names)
 
     def conclude(self, scene: bpy.types.Scene, result: SceneState) -> None:
         """Make the sensors at their present poses the placement."""
         survey, solution = result.placed()
-        live_coverage.stop()
         take_over(scene, survey.site, solution.deployment, labelled_sensors(scene, hidden=True))
         provenance = Provenance(datetime.now(UTC), result.durations, versions(blender=bpy.app.version_string))
         record = record_of(survey, solution, provenance)
@@ -291,6 +301,7 @@ def _evaluated(
 def keep_result(scene: bpy.types.Scene, state: SceneState, record: PlacementRecord) -> None:
     """Have the scene keep a placement that stands in it, all that is needed to go on later included."""
     survey, solution = state.placed()
+    live_coverage.stop()
     kept = scene.seip.result
     kept.change = "" if no_placement(scene) else change_text(record, parsed_record(kept.record))
     kept.record = record.text()
@@ -299,23 +310,14 @@ def keep_result(scene: bpy.types.Scene, state: SceneState, record: PlacementReco
     kept.sensors.clear()
     for sensor in solution.deployment.sensors:
         kept.sensors.add().name = sensor.label
-    scene.seip.sections.follow_steps()
-    session.keep_state(scene, replace(state, record=kept.record))
-
-
-def not_evaluated(scene: bpy.types.Scene) -> str:
-    """Say what was done by hand to the sensors since they were placed or evaluated; empty if nothing was."""
-    sentence = sensor_edits(scene).describe()
-    return f"{sentence} Press {SEIP_OT_evaluate_sensors.bl_label}, or undo." if sentence else ""
+    bpy.context.window_manager.seip_sections.follow_steps()
+    session.of(scene).state = replace(state, record=kept.record)
 
 
 class _Writes(ForPlacement, LongWork[Result]):
     """Mixin for operators that write the placement into the folder of the result."""
 
-    @classmethod
-    def why_not(cls, context: bpy.types.Context) -> str:
-        """Return a reason if there is no placement or no folder, or sensors were moved since."""
-        return super().why_not(context) or no_folder(context.scene) or not_evaluated(context.scene)
+    obstacles = (*ForPlacement.obstacles, no_folder, not_evaluated)
 
 
 def _checked_folder(scene: bpy.types.Scene) -> Path:
@@ -339,7 +341,7 @@ class SEIP_OT_export_result(_Writes[SceneState], bpy.types.Operator):
 
     def conclude(self, scene: bpy.types.Scene, result: SceneState) -> None:
         """Report where the files are."""
-        session.keep_state(scene, result)
+        session.of(scene).state = result
         self.report({"INFO"}, f"written to {self._folder}")
 
 
@@ -387,7 +389,7 @@ class SEIP_OT_write_report(_Writes[tuple[SceneState, tuple[Path, ...]]], bpy.typ
     def conclude(self, scene: bpy.types.Scene, result: tuple[SceneState, tuple[Path, ...]]) -> None:
         """Report where the files are."""
         state, written = result
-        session.keep_state(scene, state)
+        session.of(scene).state = state
         self.report({"INFO"}, f"written: {' and '.join(path.name for path in written)} in {written[0].parent}")
 
 
@@ -434,7 +436,7 @@ def _holds(folder: Path, record: str, _written: int | None) -> bool:
 CLASSES = (
     SEIP_OT_look_from_sensor,
     SEIP_OT_keep_placement,
-    SEIP_OT_drop_placement,
+    SEIP_OT_remove_entry,
     SEIP_OT_show_comparison,
     SEIP_OT_follow_sensors,
     SEIP_OT_evaluate_sensors,

@@ -13,76 +13,19 @@ from ..core.errors import SeipError
 from ..core.sensing.lidar.catalogue import load_catalogue
 from ..session import session
 from ..viewport import beam_preview
-from .base import Conditional, Outcome, attempt
+from .base import Conditional, Outcome, ShortWork
 
 
-class SEIP_OT_list_sensor_types(bpy.types.Operator):
-    """Read the catalogues again and list new types"""
-
-    bl_idname = "seip.list_sensor_types"
-    bl_label = "Read Catalogues"
-    bl_options = {"REGISTER", "UNDO"}
-
-    def execute(self, _context: bpy.types.Context) -> Outcome:
-        """Read them."""
-        sensor_types.refresh()
-        if session.catalogue_error:
-            self.report({"ERROR"}, session.catalogue_error)
-            return {"CANCELLED"}
-        self.report({"INFO"}, counted(len(session.sensor_types), "sensor type"))
-        return {"FINISHED"}
+def _no_preferences(_scene: bpy.types.Scene) -> str:
+    return "Install the add-on as an extension: only then it has preferences" if preferences.own() is None else ""
 
 
-class SEIP_OT_drop_sensor_type(bpy.types.Operator):
-    """Remove this sensor from the choice"""
-
-    bl_idname = "seip.drop_sensor_type"
-    bl_label = "Remove Sensor"
-    bl_options = {"REGISTER", "UNDO"}
-
-    key: bpy.props.StringProperty(name="Key", description="Catalogue key of the sensor type")
-
-    def execute(self, context: bpy.types.Context) -> Outcome:
-        """Take it out of the choice."""
-        types = context.scene.seip.survey.types
-        if self.key not in types:
-            self.report({"ERROR"}, f"there is no sensor type {self.key!r} in the list")
-            return {"CANCELLED"}
-        types[self.key].use = False
-        return {"FINISHED"}
-
-
-class SEIP_OT_about_sensor(bpy.types.Operator):
-    """Show the figures of this sensor and their sources"""
-
-    bl_idname = "seip.about_sensor"
-    bl_label = "About the Sensor"
-    bl_options = {"INTERNAL"}
-
-    key: bpy.props.StringProperty(name="Key", description="Catalogue key of the sensor type")
-
-    def execute(self, context: bpy.types.Context) -> Outcome:
-        """Open the section with the figures."""
-        seip = context.scene.seip
-        seip.survey.about = self.key
-        seip.sections.about_sensor = True
-        return {"FINISHED"}
-
-
-class _EditsCatalogues(Conditional):
-    """A mixin for operators on the list of catalogues, which preferences keep."""
-
-    @classmethod
-    def why_not(cls, _context: bpy.types.Context) -> str:
-        """Return a reason if the add-on has no preferences."""
-        return "Install the add-on as an extension: only then it has preferences" if preferences.own() is None else ""
-
-
-class SEIP_OT_add_catalogue(_EditsCatalogues, bpy.types.Operator):
+class SEIP_OT_add_catalogue(Conditional, ShortWork, bpy.types.Operator):
     """Add a catalogue of your own, which docs/sensors.md describes"""
 
     bl_idname = "seip.add_catalogue"
     bl_label = "Add Catalogue"
+    obstacles = (_no_preferences,)
 
     filepath: bpy.props.StringProperty(
         name="File", description="The catalogue", subtype="FILE_PATH", options={"PATH_SUPPORTS_BLEND_RELATIVE"}
@@ -94,11 +37,8 @@ class SEIP_OT_add_catalogue(_EditsCatalogues, bpy.types.Operator):
         context.window_manager.fileselect_add(self)
         return {"RUNNING_MODAL"}
 
-    def execute(self, _context: bpy.types.Context) -> Outcome:
+    def act(self, _context: bpy.types.Context) -> None:
         """Read it, and keep its name."""
-        return attempt(self, self._add)
-
-    def _add(self) -> None:
         path = Path(bpy.path.abspath(self.filepath))
         shipped = load_catalogue()
         models = load_catalogue([path])
@@ -110,45 +50,40 @@ class SEIP_OT_add_catalogue(_EditsCatalogues, bpy.types.Operator):
         self.report({"INFO"}, f"{path.name}: {changed} sensor types added or replaced")
 
 
-class SEIP_OT_remove_catalogue(_EditsCatalogues, bpy.types.Operator):
+class SEIP_OT_remove_catalogue(Conditional, ShortWork, bpy.types.Operator):
     """Remove a catalogue of your own from the list; the file stays"""
 
     bl_idname = "seip.remove_catalogue"
     bl_label = "Remove Catalogue"
+    obstacles = (_no_preferences,)
 
     index: bpy.props.IntProperty(name="Number", description="Index of the catalogue, from 0", min=0)
 
-    def execute(self, _context: bpy.types.Context) -> Outcome:
+    def act(self, _context: bpy.types.Context) -> None:
         """Forget it."""
-        return attempt(self, self._remove)
-
-    def _remove(self) -> None:
         preferences.remove_catalogue(self.index)
         sensor_types.refresh()
 
 
-class SEIP_OT_empty_cache(Conditional, bpy.types.Operator):
+class SEIP_OT_empty_cache(Conditional, ShortWork, bpy.types.Operator):
     """Delete all stored visibility grids; they are computed again when needed"""
 
     bl_idname = "seip.empty_cache"
     bl_label = "Empty Cache"
 
-    @classmethod
-    def why_not(cls, _context: bpy.types.Context) -> str:
-        """Return a reason if there is nothing to delete, or running work needs it."""
-        return "Wait for the work under way" if session.running is not None else preferences.why_not_empty()
+    obstacles = (
+        lambda _: "Wait for the work under way" if session.running else "",
+        lambda _: "" if preferences.kept_visibility().megabytes() else "The cache is empty",
+    )
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Outcome:
         """Ask first."""
         outcome: Outcome = context.window_manager.invoke_confirm(self, event)
         return outcome
 
-    def execute(self, _context: bpy.types.Context) -> Outcome:
+    def act(self, _context: bpy.types.Context) -> None:
         """Delete it."""
-        return attempt(self, self._empty)
-
-    def _empty(self) -> None:
-        count = preferences.empty_cache()
+        count = preferences.kept_visibility().empty()
         self.report({"INFO"}, f"{counted(count, 'file')} deleted")
 
 
@@ -188,9 +123,6 @@ class SEIP_OT_add_survey_preset(AddPresetBase, bpy.types.Operator):
 
 
 CLASSES = (
-    SEIP_OT_list_sensor_types,
-    SEIP_OT_drop_sensor_type,
-    SEIP_OT_about_sensor,
     SEIP_OT_add_catalogue,
     SEIP_OT_remove_catalogue,
     SEIP_OT_empty_cache,

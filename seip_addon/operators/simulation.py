@@ -1,4 +1,4 @@
-"""The operator that simulates runs of traffic at the site with SUMO."""
+"""Operators that install SUMO into the extension's own folder, and simulate runs of traffic at the site with it."""
 
 from __future__ import annotations
 
@@ -13,12 +13,43 @@ from .. import last_scan, preferences, scene_status
 from ..core.errors import SeipError
 from ..core.progress import Progress
 from ..core.sensing.traffic.source import TrafficFiles
+from ..core.sumo_installation import install_sumo
+from ..core.sumo_programs import Sumo
 from ..core.workflows.traffic_simulation import SimulatedRuns, simulate_runs
 from ..properties.conversion import output_folder
 from ..scene.read import read_scene
 from ..session import SceneTraffic
-from .base import Conditional, LongWork
+from .base import Conditional, LongWork, Outcome
 from .traffic import show_traffic
+
+
+class SEIP_OT_install_sumo(Conditional, LongWork[Sumo], bpy.types.Operator):
+    """Download Eclipse SUMO from PyPI into the extension's own folder, where it takes up to 470 MB. It lays out the streets of an extract of OpenStreetMap and simulates traffic"""  # noqa: E501  # a tooltip is one line
+
+    bl_idname = "seip.install_sumo"
+    bl_label = "Install SUMO"
+    bl_options = {"REGISTER"}  # nothing in the file changes
+    stopped_message = "stopped; SUMO was not installed"
+
+    obstacles = (lambda _: preferences.why_no_installation(),)
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event | None) -> Outcome:
+        """Start in the main window: work ends with its window, and that of the preferences is soon closed."""
+        main = next((window for window in context.window_manager.windows if window.parent is None), context.window)
+        with context.temp_override(window=main):
+            return super().invoke(context, event)
+
+    def prepare(self, _scene: bpy.types.Scene) -> Generator[Progress, None, Sumo]:
+        """Take pip and the folder."""
+        reason = preferences.why_no_installation()
+        if reason:
+            raise SeipError(reason)
+        return install_sumo(preferences.pip(), preferences.own_sumo_folder())
+
+    def conclude(self, _scene: bpy.types.Scene, _result: Sumo) -> None:
+        """Report what is there now."""
+        self.report({"INFO"}, preferences.sumo_status()[0])
+
 
 NO_MAP = "There is no map to simulate traffic on: name the OpenDRIVE map (.xodr) that this site was built from."
 _TEXT_MAP = "streets.net.xml"
@@ -42,10 +73,7 @@ class SEIP_OT_simulate_traffic(Conditional, LongWork[SimulatedRuns], bpy.types.O
     bl_label = "Simulate Traffic"
     stopped_message = "stopped; no run was written"
 
-    @classmethod
-    def why_not(cls, context: bpy.types.Context) -> str:
-        """Return a reason if the road, a map of it or SUMO is missing."""
-        return why_no_simulation(context.scene)
+    obstacles = (why_no_simulation,)
 
     def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, SimulatedRuns]:
         """Read the road and the map."""
@@ -82,4 +110,4 @@ def _simulated_on_text(name: str, text: str, *more: Any) -> Generator[Progress, 
         return (yield from simulate_runs(path, *more))
 
 
-CLASSES = (SEIP_OT_simulate_traffic,)
+CLASSES = (SEIP_OT_install_sumo, SEIP_OT_simulate_traffic)

@@ -10,6 +10,7 @@ import bpy
 from .. import preferences, scene_status, sensor_types
 from ..core.counts import counted
 from ..core.errors import SeipError
+from ..core.output.results.answer import sentence
 from ..core.output.results.placement_record import relevant_warnings
 from ..core.progress import Progress, finish
 from ..core.site.check import SceneContents, SiteCheck, check_site
@@ -34,7 +35,7 @@ from ..scene.startup import remove_startup_objects
 from ..scene.views import frame_site
 from ..session import CheckedScene, session
 from ..viewport import overlays
-from .base import Conditional, LongWork, Outcome, attempt
+from .base import Conditional, LongWork, Obstacles, Outcome, ShortWork
 
 EXAMPLE = Path(__file__).resolve().parents[2] / "scenes" / f"junction{DESCRIPTION_SUFFIX}"
 """The site that comes with SEIP: beside the package, in a checkout as in the extension."""
@@ -52,10 +53,7 @@ AREA_ITEMS = tuple(item for item in ROLE_ITEMS if Role[item[0]] in roles.AREAS)
 class _WritesScene(Conditional):
     """A mixin for operators that write into the scene, which must belong to the open file."""
 
-    @classmethod
-    def why_not(cls, context: bpy.types.Context) -> str:
-        """Return a reason if the scene is linked from another file."""
-        return scene_status.not_own(context.scene)
+    obstacles: Obstacles = (scene_status.not_own,)
 
 
 class SEIP_OT_choose_map(_WritesScene, LongWork[SitePlaces], bpy.types.Operator):
@@ -100,10 +98,10 @@ class SEIP_OT_choose_map(_WritesScene, LongWork[SitePlaces], bpy.types.Operator)
             self._ask(site, result)
 
     def _ask(self, site: SEIP_PG_site, found: SitePlaces) -> None:
-        """Ask for the place: on the map of an extract, in a dialog where there is no map or only one junction."""
-        if len(found.places) == 1:
+        """Ask for the place: on the map, or in a dialog where a description or the only junction gives it."""
+        if len(found.places) == 1 and not site.is_described():
             site.junction = found.places[0].name
-        elif bpy.ops.seip.pick_junction.poll():
+        elif not site.is_described() and bpy.ops.seip.pick_junction.poll():
             bpy.ops.seip.pick_junction("INVOKE_DEFAULT")
             return
         bpy.ops.seip.choose_place("INVOKE_DEFAULT")
@@ -132,11 +130,11 @@ class SEIP_OT_download_map(_WritesScene, LongWork[tuple[Path, SitePlaces]], bpy.
     bl_label = "Download Map"
     stopped_message = "stopped; nothing was downloaded"
 
-    @classmethod
-    def why_not(cls, context: bpy.types.Context) -> str:
-        """Return a reason if there is no place, or Blender may not go online."""
-        place = "" if context.scene.seip.site.new_site else NO_NEW_SITE
-        return super().why_not(context) or place or preferences.why_no_download()
+    obstacles = (
+        *_WritesScene.obstacles,
+        lambda scene: "" if scene.seip.site.new_site else NO_NEW_SITE,
+        lambda _: preferences.why_no_download(),
+    )
 
     def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, tuple[Path, SitePlaces]]:
         """Take the position, for a site of the usual size: a larger one downloads more when it is built."""
@@ -156,6 +154,22 @@ def _downloaded(request: SiteRequest) -> Generator[Progress, None, tuple[Path, S
     """Download an extract, and list its junctions."""
     path = yield from site_source(request)
     return path, (yield from site_places(path))
+
+
+def missing_for_build(scene: bpy.types.Scene) -> str:
+    """Say what is missing before a site can be built, or nothing."""
+    site = scene.seip.site
+    if not site.source:
+        return "Choose a map first"
+    if site.is_extract() and preferences.sumo() is None:
+        return preferences.NO_SUMO
+    if not site.has_place():
+        return NO_PLACE
+    try:
+        site.request()
+    except SeipError as error:
+        return str(error)
+    return ""
 
 
 class _BuildsSite(_WritesScene, LongWork[BuiltSite]):
@@ -204,10 +218,7 @@ class SEIP_OT_build_site(_BuildsSite, bpy.types.Operator):
     bl_idname = "seip.build_site"
     bl_label = "Build Site"
 
-    @classmethod
-    def why_not(cls, context: bpy.types.Context) -> str:
-        """Return a reason if no place is chosen or the scene is linked from another file."""
-        return missing_for_build(context.scene) or super().why_not(context)
+    obstacles = (missing_for_build, *_WritesScene.obstacles)
 
     def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, BuiltSite]:
         """Take what was chosen."""
@@ -263,16 +274,6 @@ def _bring_to_front(scene: bpy.types.Scene) -> None:
     overlays.open_sidebar(window)
 
 
-def missing_for_build(scene: bpy.types.Scene) -> str:
-    """Say what is missing before a site can be built, or nothing."""
-    site = scene.seip.site
-    if not site.source:
-        return "Choose a map first"
-    if site.is_extract() and preferences.sumo() is None:
-        return preferences.NO_SUMO
-    return "" if site.has_place() else NO_PLACE
-
-
 def is_of_choice(scene: bpy.types.Scene) -> bool:
     """Return whether the site of a scene is of the chosen place on the chosen map: a new one replaces it."""
     return has_site(scene) and scene.get(contract.BUILT) == scene.seip.site.place()
@@ -283,55 +284,26 @@ def has_site(scene: bpy.types.Scene) -> bool:
     return any(contract.base_name(collection) in contract.INPUTS for collection in scene.collection.children_recursive)
 
 
-class _RoleOperator(Conditional):
-    """A mixin for operators on the selected objects and a role."""
+class SEIP_OT_assign_role(_WritesScene, ShortWork, bpy.types.Operator):
+    """Link the selected objects to the collection of a role, or remove them from it; other collections stay"""
 
+    bl_idname = "seip.assign_role"
+    bl_label = "Assign"
     bl_options = {"REGISTER", "UNDO"}
 
     role: bpy.props.EnumProperty(name="Role", description="Role of the objects in the placement", items=ROLE_ITEMS)
+    remove: bpy.props.BoolProperty(name="Remove", description="Take the objects out of the role", default=False)
 
     @classmethod
     def why_not(cls, context: bpy.types.Context) -> str:
         """Return a reason if nothing is selected or the scene is linked from another file."""
-        return why_no_role(context)
+        return super().why_not(context) or ("" if context.selected_objects else "Select objects first")
 
-
-NOTHING_SELECTED = "Select objects first"
-
-
-def why_no_role(context: bpy.types.Context) -> str:
-    """Say why no role can be given or taken, or nothing."""
-    return scene_status.not_own(context.scene) or ("" if context.selected_objects else NOTHING_SELECTED)
-
-
-class SEIP_OT_assign_role(_RoleOperator, bpy.types.Operator):
-    """Link the selected objects to the collection of a role; other roles and collections stay"""
-
-    bl_idname = "seip.assign_role"
-    bl_label = "Assign"
-
-    def execute(self, context: bpy.types.Context) -> Outcome:
-        """Link them."""
-        return attempt(self, lambda: self._assign(context, Role[self.role]))
-
-    def _assign(self, context: bpy.types.Context, role: Role) -> None:
-        count = roles.assign(context.scene, context.selected_objects, role)
-        self.report({"INFO"}, f"{count} assigned to the {role.value}")
-
-
-class SEIP_OT_take_out_of_role(_RoleOperator, bpy.types.Operator):
-    """Unlink the selected objects from the collections of a role; other roles and collections stay"""
-
-    bl_idname = "seip.take_out_of_role"
-    bl_label = "Remove"
-
-    def execute(self, context: bpy.types.Context) -> Outcome:
-        """Unlink them."""
-        return attempt(self, lambda: self._take_out(context, Role[self.role]))
-
-    def _take_out(self, context: bpy.types.Context, role: Role) -> None:
-        count = roles.take_out(context.scene, context.selected_objects, role)
-        self.report({"INFO"}, f"{count} taken out of the {role.value}")
+    def act(self, context: bpy.types.Context) -> None:
+        """Link or unlink them."""
+        role = Role[self.role]
+        change, what = (roles.take_out, "taken out of") if self.remove else (roles.assign, "assigned to")
+        self.report({"INFO"}, f"{change(context.scene, context.selected_objects, role)} {what} the {role.value}")
 
 
 class SEIP_OT_add_area(_WritesScene, bpy.types.Operator):
@@ -417,7 +389,7 @@ class SEIP_OT_check_site(LongWork[SiteCheck], bpy.types.Operator):
 
     def conclude(self, scene: bpy.types.Scene, result: SiteCheck) -> None:
         """List what was found."""
-        session.checks[scene.session_uid] = CheckedScene(self._watch, self._settings)
+        session.of(scene).check = CheckedScene(self._watch, self._settings)
         site = scene.seip.site
         site.checked = True
         site.counts.clear()
@@ -427,8 +399,9 @@ class SEIP_OT_check_site(LongWork[SiteCheck], bpy.types.Operator):
         site.problems.clear()
         for problem in result.problems:
             listed = site.problems.add()
-            listed.name, listed.text, listed.is_error = problem.obj, problem.text, problem.severity == "ERROR"
-        scene.seip.sections.follow_steps()
+            listed.name, listed.text = problem.obj, sentence(problem.text)
+            listed.is_error = problem.severity == "ERROR"
+        bpy.context.window_manager.seip_sections.follow_steps()
         self.report({"INFO"}, in_short(site.problems))
 
 
@@ -454,7 +427,7 @@ def in_short(problems: Iterable[SEIP_PG_problem]) -> str:
     return f"{errors}, {warnings}" if any(kinds) else warnings
 
 
-class SEIP_OT_show_problem(bpy.types.Operator):
+class SEIP_OT_show_problem(ShortWork, bpy.types.Operator):
     """Select the object with the problem, and bring it into view"""
 
     bl_idname = "seip.show_problem"
@@ -463,11 +436,8 @@ class SEIP_OT_show_problem(bpy.types.Operator):
 
     number: bpy.props.IntProperty(name="Number", description="Number of the problem in the list, from 0", min=0)
 
-    def execute(self, context: bpy.types.Context) -> Outcome:
+    def act(self, context: bpy.types.Context) -> None:
         """Select it alone, and frame it."""
-        return attempt(self, lambda: self._show(context))
-
-    def _show(self, context: bpy.types.Context) -> None:
         obstacle = nothing_to_show(context, self.number)
         if obstacle:
             raise SeipError(obstacle)
@@ -515,7 +485,6 @@ CLASSES = (
     SEIP_OT_build_site,
     SEIP_OT_load_example,
     SEIP_OT_assign_role,
-    SEIP_OT_take_out_of_role,
     SEIP_OT_add_area,
     SEIP_OT_check_site,
     SEIP_OT_show_problem,

@@ -1,4 +1,4 @@
-"""Operator that lets a user pick a junction on the map of an extract."""
+"""Operator that lets a user pick a junction on a map of the streets."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class SEIP_OT_pick_junction(bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Return whether there is a map to draw, and a viewport to draw it in."""
-        return session.places is not None and session.places.has_map and viewport_of(context.window) is not None
+        return session.places is not None and bool(session.places.places) and viewport_of(context.window) is not None
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> Outcome:
         """Draw the map in the largest viewport of the window, and wait for the mouse."""

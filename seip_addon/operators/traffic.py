@@ -23,7 +23,7 @@ from ..scene.read import read_scene
 from ..scene.sensors import read_sensors
 from ..scene.traffic import animate, clear_traffic, read_traffic
 from ..session import LastScan, SceneTraffic, session
-from .base import Conditional, LongWork, Outcome, Result
+from .base import Conditional, LongWork, Outcome
 
 NO_FILE = "There is no traffic file: name one, or animate objects of your own in SEIP Traffic."
 NO_TRAFFIC = "There is nothing to scan: name a traffic file, or animate objects in SEIP Traffic."
@@ -44,25 +44,13 @@ def why_no_scan(scene: bpy.types.Scene) -> str:
     return "" if there else NO_TRAFFIC
 
 
-class _Scanning(Conditional, LongWork[Result]):
-    """A mixin: a button that works where there are sensors and traffic."""
-
-    @classmethod
-    def why_not(cls, context: bpy.types.Context) -> str:
-        """Return a reason if there is no traffic to scan or no sensor to scan with."""
-        return why_no_scan(context.scene)
-
-
 class SEIP_OT_load_traffic(Conditional, LongWork[LoadedTraffic], bpy.types.Operator):
     """Read the traffic file and animate its road users on the road"""
 
     bl_idname = "seip.load_traffic"
     bl_label = "Load Traffic"
 
-    @classmethod
-    def why_not(cls, context: bpy.types.Context) -> str:
-        """Return a reason if there is no file to read."""
-        return why_no_load(context.scene)
+    obstacles = (why_no_load,)
 
     def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, LoadedTraffic]:
         """Read the scene that the traffic is to stand on."""
@@ -82,7 +70,7 @@ def show_traffic(scene: bpy.types.Scene, traffic: SceneTraffic, warnings: Sequen
     """Animate road users read from files, in place of earlier ones and of their scan, and note what there is."""
     animate(scene, traffic.trajectories)
     last_scan.hide_cloud(scene)
-    session.traffic[scene.session_uid] = traffic
+    session.of(scene).traffic = traffic
     scene.seip.traffic.loaded = "\n".join((*_facts(traffic.trajectories), *warnings))
 
 
@@ -93,32 +81,30 @@ class SEIP_OT_clear_traffic(Conditional, bpy.types.Operator):
     bl_label = "Clear Traffic"
     bl_options = {"REGISTER", "UNDO"}
 
-    @classmethod
-    def why_not(cls, context: bpy.types.Context) -> str:
-        """Return a reason if there is no traffic."""
-        return "there is no traffic in the scene" if contract.find(context.scene, contract.TRAFFIC) is None else ""
+    obstacles = (lambda scene: "" if contract.find(scene, contract.TRAFFIC) else "there is no traffic in the scene",)
 
     def execute(self, context: bpy.types.Context) -> Outcome:
         """Take it out."""
         scene = context.scene
         clear_traffic(scene)
-        session.traffic.pop(scene.session_uid, None)
+        session.of(scene).traffic = None
         last_scan.hide_cloud(scene)
         scene.seip.traffic.loaded = ""
         return {"FINISHED"}
 
 
-class SEIP_OT_scan_frame(_Scanning[LastScan], bpy.types.Operator):
+class SEIP_OT_scan_frame(Conditional, LongWork[LastScan], bpy.types.Operator):
     """Show the point cloud of the placed sensors at the current frame"""
 
     bl_idname = "seip.scan_frame"
+    obstacles = (why_no_scan,)
     bl_label = "Scan This Frame"
     bl_options = {"REGISTER"}  # nothing in the file changes
 
     def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, LastScan]:
         """Read what is scanned."""
         self._scene_read = _SceneRead(scene)
-        return _scanned(self._scene_read, last_scan.now(scene), session.scan_of(scene))
+        return _scanned(self._scene_read, last_scan.now(scene), session.of(scene).scan)
 
     def conclude(self, scene: bpy.types.Scene, result: LastScan) -> None:
         """Show the points."""
@@ -139,22 +125,11 @@ def _scanned(read: _SceneRead, at: float, before: LastScan | None) -> Generator[
     return last_scan.measure(run, simulation, at)
 
 
-class SEIP_OT_hide_scan(bpy.types.Operator):
-    """Hide the point cloud"""
-
-    bl_idname = "seip.hide_scan"
-    bl_label = "Hide Point Cloud"
-
-    def execute(self, context: bpy.types.Context) -> Outcome:
-        """Hide it."""
-        last_scan.hide_cloud(context.scene)
-        return {"FINISHED"}
-
-
-class SEIP_OT_write_dataset(_Scanning[tuple[Record, tuple[str, ...]]], bpy.types.Operator):
+class SEIP_OT_write_dataset(Conditional, LongWork[tuple[Record, tuple[str, ...]]], bpy.types.Operator):
     """Scan all frames and write them with the boxes of all road users, as datasets for training detectors"""
 
     bl_idname = "seip.write_dataset"
+    obstacles = (why_no_scan,)
     bl_label = "Write Dataset"
     bl_options = {"REGISTER"}  # as above
     stopped_message = "stopped; what is written stays, and the same run goes on from there"
@@ -208,7 +183,7 @@ class _SceneRead:
     def keep_traffic(self, scene: bpy.types.Scene) -> None:
         """Hold what was read from files, so that the next scan need not."""
         if self._files is not None and self._trajectories is not None:
-            session.traffic[scene.session_uid] = SceneTraffic(self._files, self._changed, self._trajectories)
+            session.of(scene).traffic = SceneTraffic(self._files, self._changed, self._trajectories)
 
 
 def _facts(trajectories: Trajectories) -> list[str]:
@@ -220,6 +195,5 @@ CLASSES = (
     SEIP_OT_load_traffic,
     SEIP_OT_clear_traffic,
     SEIP_OT_scan_frame,
-    SEIP_OT_hide_scan,
     SEIP_OT_write_dataset,
 )

@@ -10,6 +10,7 @@ from tempfile import TemporaryDirectory
 import bpy
 
 from .. import live_coverage, preferences, scene_status
+from ..core.errors import SeipError
 from ..core.output.pictures.verification import save_changes_picture, save_returns_chart
 from ..core.output.results.file_names import VERIFICATION_FILE, VERIFICATION_FOLDER, VERIFICATION_PICTURES
 from ..core.output.results.verification_text import summary
@@ -36,10 +37,9 @@ from ..scene.corrections import correct_scene
 from ..scene.read import read_scene
 from ..scene.sensors import labelled_sensors, read_sensors
 from ..session import LastVerification, session
-from .base import Conditional, LongWork, Outcome, attempt
+from .base import Conditional, LongWork, ShortWork
 from .detection import folder_of_result
 from .results import no_folder
-from .view import show_picture
 
 NO_SENSORS = "There is no sensor to verify: place sensors first."
 NO_RECORDING = "Name a recording of the installed sensors: a folder of sweeps, or a .pcap."
@@ -68,7 +68,7 @@ def why_no_verification(scene: bpy.types.Scene) -> str:
 
 def why_no_correction(scene: bpy.types.Scene) -> str:
     """Return why the scene cannot be corrected by the last verification, or ""."""
-    last = session.verification_of(scene)
+    last = session.of(scene).verification
     if last is None:
         return NOT_VERIFIED
     return CHANGED if last.watch.changed else ""
@@ -77,6 +77,12 @@ def why_no_correction(scene: bpy.types.Scene) -> str:
 def sentences_of(scene: bpy.types.Scene) -> tuple[str, ...]:
     """Return what the last verification of a scene found; the file keeps it."""
     return tuple(scene.seip.verification.found.splitlines())
+
+
+def picture_of(scene: bpy.types.Scene) -> Path | None:
+    """Return the picture of a scene's last verification, None where it is gone."""
+    path = None if no_folder(scene) else _folder_of(scene) / CHANGES
+    return path if path is not None and path.is_file() else None
 
 
 def _folder_of(scene: bpy.types.Scene) -> Path:
@@ -91,10 +97,7 @@ class SEIP_OT_verify(Conditional, LongWork[_Verified], bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO"}  # the scene keeps what was found, also when a correction is undone
     stopped_message = "stopped; nothing was written"
 
-    @classmethod
-    def why_not(cls, context: bpy.types.Context) -> str:
-        """Return a reason if sensors or a recording are missing."""
-        return why_no_verification(context.scene)
+    obstacles = (why_no_verification,)
 
     def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, _Verified]:
         """Read the scene and its sensors, and open the recording."""
@@ -118,7 +121,7 @@ class SEIP_OT_verify(Conditional, LongWork[_Verified], bpy.types.Operator):
             with whole_file(self._folder / name) as temporary:
                 temporary.write_bytes(content)
         scene.seip.verification.found = "\n".join(result.sentences)
-        session.verifications[scene.session_uid] = LastVerification(result.found, self._watch)
+        session.of(scene).verification = LastVerification(result.found, self._watch)
         for sentence in result.found.warnings:
             self.report({"WARNING"}, sentence)
         self.report({"INFO"}, f"verified; written to {self._folder}")
@@ -149,24 +152,21 @@ def _verified(
         return _Verified(found, sentences, {path.name: path.read_bytes() for path in sorted(drawn.iterdir())})
 
 
-class SEIP_OT_correct_scene(Conditional, bpy.types.Operator):
+class SEIP_OT_correct_scene(Conditional, ShortWork, bpy.types.Operator):
     """Add new objects as boxes, remove those that are gone, and move the sensors to their installed poses"""
 
     bl_idname = "seip.correct_scene"
     bl_label = "Add to Scene"
     bl_options = {"REGISTER", "UNDO"}
 
-    @classmethod
-    def why_not(cls, context: bpy.types.Context) -> str:
-        """Return a reason if the scene was not verified or has changed since."""
-        return why_no_correction(context.scene)
+    obstacles = (why_no_correction,)
 
-    def execute(self, context: bpy.types.Context) -> Outcome:
+    def act(self, context: bpy.types.Context) -> None:
         """Correct the scene."""
-        return attempt(self, lambda: self._correct(context.scene))
-
-    def _correct(self, scene: bpy.types.Scene) -> None:
-        last = session.verifications[scene.session_uid]
+        scene = context.scene
+        last = session.of(scene).verification
+        if last is None:
+            raise SeipError(NOT_VERIFIED)
         live_coverage.stop()
         problems = correct_scene(scene, last.found)
         last.watch.look(scene)  # so that nothing is added twice
@@ -175,21 +175,4 @@ class SEIP_OT_correct_scene(Conditional, bpy.types.Operator):
         self.report({"INFO"}, "the scene is as recorded; its placement is stale")
 
 
-class SEIP_OT_show_changes(bpy.types.Operator):
-    """Show the recording and its differences from the scene in the render window"""
-
-    bl_idname = "seip.show_changes"
-    bl_label = "Show Picture"
-    bl_options = {"INTERNAL"}  # the panel offers it where there is a verification
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """Return whether there is a verification."""
-        return bool(sentences_of(context.scene))
-
-    def execute(self, context: bpy.types.Context) -> Outcome:
-        """Open it."""
-        return attempt(self, lambda: show_picture(context, _folder_of(context.scene) / CHANGES))
-
-
-CLASSES = (SEIP_OT_verify, SEIP_OT_correct_scene, SEIP_OT_show_changes)
+CLASSES = (SEIP_OT_verify, SEIP_OT_correct_scene)

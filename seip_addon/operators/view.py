@@ -10,7 +10,7 @@ from typing import Any
 
 import bpy
 
-from .. import scene_survey
+from .. import last_scan, scene_survey
 from ..core.errors import SeipError
 from ..core.progress import Progress
 from ..core.sensing.visibility.sight_lines import pose_at, sight_lines
@@ -20,13 +20,12 @@ from ..scene.sensors import placed_sensors, pose_of
 from ..scene.write import coverage_of
 from ..session import SceneState, session
 from ..viewport import coverage, overlays
+from ..viewport.point_cloud import NAME as CLOUD
 from ..viewport.sight_lines import NAME as SIGHT
 from ..viewport.sight_lines import sight_overlay
 from .base import Conditional, LongWork, Outcome, attempt
-from .results import PLAN, ForPlacement, exported_files, not_evaluated
+from .results import ForPlacement, not_evaluated
 
-LAID_OUT = 0.2
-"""Seconds after which Blender has laid out a window that was opened."""
 NO_COVERAGE = "There is no coverage to show: place sensors first."
 
 
@@ -36,7 +35,7 @@ def why_no_coverage(scene: bpy.types.Scene) -> str:
 
 
 class SEIP_OT_colour_coverage(Conditional, bpy.types.Operator):
-    """Colour the coverage on the road, with a legend"""
+    """Colour the coverage on the road, with a legend; a Solid view is set to show the colours"""
 
     bl_idname = "seip.colour_coverage"
     bl_label = "Colour Coverage"
@@ -54,54 +53,17 @@ class SEIP_OT_colour_coverage(Conditional, bpy.types.Operator):
         default="times",
     )
 
-    @classmethod
-    def why_not(cls, context: bpy.types.Context) -> str:
-        """Return a reason if there is no coverage to colour."""
-        return why_no_coverage(context.scene)
+    obstacles = (why_no_coverage,)
 
     def execute(self, context: bpy.types.Context) -> Outcome:
         """Colour it."""
         outcome = attempt(self, lambda: colour_coverage(context.scene, self.aspect))
         if outcome == {"FINISHED"}:
-            coverage.show(context.scene)
+            context.scene.seip.view.legend = True
+            view = context.space_data
+            if isinstance(view, bpy.types.SpaceView3D) and not coverage.shows_coverage(view):
+                coverage.set_shading(view)
         return outcome
-
-
-class SEIP_OT_show_coverage_colours(bpy.types.Operator):
-    """Set this view to Solid shading in the materials' colours, which shows the coverage"""
-
-    bl_idname = "seip.show_coverage_colours"
-    bl_label = "Show Colours in This View"
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """Return whether this is a view."""
-        return isinstance(context.space_data, bpy.types.SpaceView3D)
-
-    def execute(self, context: bpy.types.Context) -> Outcome:
-        """Set the shading."""
-        coverage.set_shading(context.space_data)
-        return {"FINISHED"}
-
-
-class SEIP_OT_toggle_legend(Conditional, bpy.types.Operator):
-    """Show or hide the legend of the coverage"""
-
-    bl_idname = "seip.toggle_legend"
-    bl_label = "Legend"
-
-    @classmethod
-    def why_not(cls, context: bpy.types.Context) -> str:
-        """Return a reason if there is no coverage to explain."""
-        return why_no_coverage(context.scene)
-
-    def execute(self, context: bpy.types.Context) -> Outcome:
-        """Show it where it is hidden, and the other way round."""
-        if overlays.find(context.scene, coverage.NAME) is None:
-            coverage.show(context.scene)
-        else:
-            coverage.hide(context.scene)
-        return {"FINISHED"}
 
 
 _items: list[tuple[str, str, str]] = []
@@ -129,7 +91,7 @@ class SEIP_OT_show_sight_lines(ForPlacement, LongWork[SceneState], bpy.types.Ope
 
     def conclude(self, scene: bpy.types.Scene, result: SceneState) -> None:
         """Draw them."""
-        session.keep_state(scene, result)
+        session.of(scene).state = result
         obj = placed_sensors(scene).get(self.sensor)
         survey, _ = result.placed()
         if obj is None:
@@ -144,15 +106,19 @@ class SEIP_OT_show_sight_lines(ForPlacement, LongWork[SceneState], bpy.types.Ope
         overlays.show(scene, SIGHT, sight_overlay(sight, self.sensor))
 
 
-class SEIP_OT_hide_sight_lines(bpy.types.Operator):
-    """Hide the sight lines"""
+class SEIP_OT_hide_overlay(bpy.types.Operator):
+    """Hide these points or lines"""
 
-    bl_idname = "seip.hide_sight_lines"
-    bl_label = "Hide Sight Lines"
+    bl_idname = "seip.hide_overlay"
+    bl_label = "Hide"
+
+    name: bpy.props.StringProperty(name="Name", description="Name of what is drawn over the view")
 
     def execute(self, context: bpy.types.Context) -> Outcome:
-        """Hide them."""
-        overlays.hide(context.scene, SIGHT)
+        """Hide it; a point cloud is forgotten, as it would be shown again in other colours."""
+        if self.name == CLOUD:
+            last_scan.hide_cloud(context.scene)
+        overlays.hide(context.scene, self.name)
         return {"FINISHED"}
 
 
@@ -168,10 +134,7 @@ class SEIP_OT_save_picture(ForPlacement, LongWork[SceneState], bpy.types.Operato
         self._area = context.area
         return super().invoke(context, event)
 
-    @classmethod
-    def why_not(cls, context: bpy.types.Context) -> str:
-        """Return a reason if there is no placement, or sensors were moved since."""
-        return super().why_not(context) or not_evaluated(context.scene)
+    obstacles = (*ForPlacement.obstacles, not_evaluated)
 
     def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, SceneState]:
         """Return the job that restores the placement."""
@@ -180,7 +143,7 @@ class SEIP_OT_save_picture(ForPlacement, LongWork[SceneState], bpy.types.Operato
 
     def conclude(self, scene: bpy.types.Scene, result: SceneState) -> None:
         """Take the picture of a viewport."""
-        session.keep_state(scene, result)
+        session.of(scene).state = result
         area = getattr(self, "_area", None) or bpy.context.area
         if bpy.app.background or area not in _viewports():
             raise SeipError(
@@ -189,68 +152,6 @@ class SEIP_OT_save_picture(ForPlacement, LongWork[SceneState], bpy.types.Operato
             )
         save_viewport_sheet(self._path, scene, area, result)
         self.report({"INFO"}, f"written {self._path}")
-
-
-class SEIP_OT_show_plan(bpy.types.Operator):
-    """Show the exported plan in the window in which Blender shows renderings"""
-
-    bl_idname = "seip.show_plan"
-    bl_label = "Show Plan"
-    bl_options = {"INTERNAL"}  # the panel offers it where there is a plan
-
-    def execute(self, context: bpy.types.Context) -> Outcome:
-        """Open it."""
-        return attempt(self, lambda: self._show(context))
-
-    def _show(self, context: bpy.types.Context) -> None:
-        path = exported_files(context.scene).get(PLAN)
-        if path is None:
-            raise SeipError("there is no plan of this placement in the folder of the result: export it first")
-        show_picture(context, path)
-
-
-def show_picture(context: bpy.types.Context, path: Path) -> None:
-    """Show a picture in the window in which Blender shows renderings, as large as the window.
-
-    Raises
-    ------
-    SeipError
-        There is no such picture, or no window.
-    """
-    if not path.is_file():
-        raise SeipError(f"the picture {path} is no longer there: write it again")
-    image = bpy.data.images.load(str(path), check_existing=True)
-    image.reload()  # it may be that of an earlier result
-    found = _image_window(context)
-    if found is None:
-        raise SeipError(f"Blender has opened no window for the picture: open {path}")
-    window, area = found
-    area.spaces.active.image = image
-    bpy.app.timers.register(lambda: _fit(window, area), first_interval=LAID_OUT)
-
-
-def _fit(window: bpy.types.Window, area: bpy.types.Area) -> None:
-    """Show the whole image of an editor as large as its window, unless that was closed meanwhile."""
-    if window not in bpy.context.window_manager.windows[:] or area not in window.screen.areas[:]:
-        return
-    region = next(region for region in area.regions if region.type == "WINDOW")
-    with bpy.context.temp_override(window=window, area=area, region=region):
-        bpy.ops.image.view_all(fit_view=True)
-
-
-def _image_window(context: bpy.types.Context) -> tuple[bpy.types.Window, bpy.types.Area] | None:
-    """Open the window in which Blender shows renderings, or bring it to the front, and return it with its editor."""
-    view = context.preferences.view
-    before = view.render_display_type
-    view.render_display_type = "WINDOW"  # other ways would change the layout of the present window
-    try:
-        if bpy.ops.render.view_show.poll():
-            bpy.ops.render.view_show("INVOKE_DEFAULT")
-    finally:
-        view.render_display_type = before
-    windows = [window for window in context.window_manager.windows if window.screen.is_temporary]
-    found = ((window, area) for window in windows for area in window.screen.areas if area.type == "IMAGE_EDITOR")
-    return next(found, None)
 
 
 def save_viewport_sheet(path: Path, scene: bpy.types.Scene, area: bpy.types.Area, state: SceneState) -> None:
@@ -299,10 +200,7 @@ def _free(path: Path) -> Path:
 
 CLASSES = (
     SEIP_OT_colour_coverage,
-    SEIP_OT_show_coverage_colours,
-    SEIP_OT_toggle_legend,
     SEIP_OT_show_sight_lines,
-    SEIP_OT_hide_sight_lines,
     SEIP_OT_save_picture,
-    SEIP_OT_show_plan,
+    SEIP_OT_hide_overlay,
 )

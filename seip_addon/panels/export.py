@@ -7,8 +7,7 @@ from pathlib import Path
 import bpy
 
 from ..operators import results
-from ..operators.view import SEIP_OT_save_picture, SEIP_OT_show_plan
-from .run_button import draw_run
+from .sidebar import draw_path, draw_run
 from .wrapped_text import draw_sentence
 
 
@@ -19,18 +18,17 @@ def draw(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     if sentence:
         draw_sentence(layout, sentence, icon="INFO")
         return
-    layout.prop(scene.seip.result, "folder", text="")
+    draw_path(layout, scene.seip.result, "folder")
     layout.prop(scene.seip.result, "render")
     sentence = results.no_folder(scene) or results.not_evaluated(scene)
     if sentence:
         draw_sentence(layout, sentence, icon="INFO")
-    draw_run(layout, results.SEIP_OT_write_report.bl_idname, icon="FILE_TEXT")
-    draw_run(layout, results.SEIP_OT_export_result.bl_idname, icon="EXPORT", text="Export Files")
+    draw_run(layout, "seip.write_report", icon="FILE_TEXT")
+    draw_run(layout, "seip.export_result", icon="EXPORT", text="Export Files")
     _draw_files(layout, results.exported_files(scene))
     column = layout.column(align=True)
-    column.label(text="Picture")
-    column.prop(scene.seip.view, "picture", text="")
-    draw_run(column, SEIP_OT_save_picture.bl_idname, icon="IMAGE_DATA")
+    draw_path(column, scene.seip.view, "picture")
+    draw_run(column, "seip.save_picture", icon="IMAGE_DATA")
 
 
 def _draw_files(layout: bpy.types.UILayout, files: dict[str, Path]) -> None:
@@ -39,7 +37,7 @@ def _draw_files(layout: bpy.types.UILayout, files: dict[str, Path]) -> None:
         return
     row = layout.row(align=True)
     if results.PLAN in files:
-        row.operator(SEIP_OT_show_plan.bl_idname, icon="IMAGE_DATA")
+        row.operator("wm.path_open", text="Open Plan", icon="IMAGE_DATA").filepath = str(files[results.PLAN])
     if results.REPORT in files:
         row.operator("wm.path_open", text="Open Report", icon="URL").filepath = str(files[results.REPORT])
     row.operator("wm.path_open", text="", icon="FILE_FOLDER").filepath = str(next(iter(files.values())).parent)

@@ -4,68 +4,17 @@ from __future__ import annotations
 
 import bpy
 
-from ..core.errors import SeipError
-from ..operators.base import Outcome, SEIP_OT_stop, attempt
-from ..operators.detection import SEIP_OT_detect
-from ..operators.placement import SEIP_OT_solve_placement
-from ..operators.results import SEIP_OT_evaluate_sensors, SEIP_OT_export_result
-from ..operators.sensors import SEIP_OT_add_catalogue, SEIP_OT_preview_beams
-from ..operators.simulation import SEIP_OT_simulate_traffic
 from ..operators.site import (
     EXTRACTS,
-    SEIP_OT_add_area,
-    SEIP_OT_build_site,
-    SEIP_OT_check_site,
-    SEIP_OT_choose_map,
-    SEIP_OT_download_map,
-    SEIP_OT_load_example,
-    missing_for_build,
 )
-from ..operators.traffic import SEIP_OT_load_traffic, SEIP_OT_scan_frame, SEIP_OT_write_dataset
-from ..operators.view import SEIP_OT_colour_coverage, SEIP_OT_save_picture
-from ..operators.visibility import SEIP_OT_compute_visibility
-from .site import draw_place
 
 OPENDRIVE = "*.xodr"
-DIALOG_WIDTH = 420
-
-
-class SEIP_OT_choose_place(bpy.types.Operator):
-    """Choose the junction of the site, and the length of its streets"""
-
-    bl_idname = "seip.choose_place"
-    bl_label = "Import Site"
-    bl_options = {"INTERNAL"}
-
-    def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> Outcome:
-        """Ask."""
-        outcome: Outcome = context.window_manager.invoke_props_dialog(
-            self, width=DIALOG_WIDTH, confirm_text=SEIP_OT_build_site.bl_label
-        )
-        return outcome
-
-    def draw(self, context: bpy.types.Context) -> None:
-        """Draw the file, and the choice of the place."""
-        site = context.scene.seip.site
-        self.layout.label(text=bpy.path.basename(site.source), icon="FILE", translate=False)
-        draw_place(self.layout, site, DIALOG_WIDTH)
-
-    def execute(self, context: bpy.types.Context) -> Outcome:
-        """Build the site."""
-        return attempt(self, lambda: _build(context.scene))
-
-
-def _build(scene: bpy.types.Scene) -> None:
-    missing = missing_for_build(scene)
-    if missing:
-        raise SeipError(f"{missing}, in the sidebar's tab SEIP")
-    bpy.ops.seip.build_site("INVOKE_DEFAULT")
 
 
 class _Dropped:
     """A mixin: a file that is dropped into a 3D view is imported."""
 
-    bl_import_operator = SEIP_OT_choose_map.bl_idname
+    bl_import_operator = "seip.choose_map"
 
     @classmethod
     def poll_drop(cls, context: bpy.types.Context) -> bool:
@@ -101,17 +50,17 @@ class SEIP_MT_main(bpy.types.Menu):
         layout.operator_context = "INVOKE_DEFAULT"
         for step in STEPS:
             for operator in step:
-                layout.operator(operator.bl_idname)
+                layout.operator(f"seip.{operator}")
             layout.separator()
 
 
-STEPS: tuple[tuple[type[bpy.types.Operator], ...], ...] = (
-    (SEIP_OT_load_example, SEIP_OT_download_map, SEIP_OT_choose_map, SEIP_OT_build_site, SEIP_OT_check_site),
-    (SEIP_OT_add_catalogue, SEIP_OT_preview_beams, SEIP_OT_compute_visibility, SEIP_OT_solve_placement),
-    (SEIP_OT_evaluate_sensors, SEIP_OT_export_result),
-    (SEIP_OT_colour_coverage, SEIP_OT_save_picture),
-    (SEIP_OT_load_traffic, SEIP_OT_simulate_traffic, SEIP_OT_scan_frame, SEIP_OT_write_dataset, SEIP_OT_detect),
-    (SEIP_OT_stop,),
+STEPS: tuple[tuple[str, ...], ...] = (
+    ("load_example", "download_map", "choose_map", "build_site", "check_site"),
+    ("add_catalogue", "preview_beams", "compute_visibility", "solve_placement"),
+    ("evaluate_sensors", "export_result"),
+    ("colour_coverage", "save_picture"),
+    ("load_traffic", "simulate_traffic", "scan_frame", "write_dataset", "detect"),
+    ("stop",),
 )
 """Operators of the menu, by step of the work."""
 
@@ -119,14 +68,14 @@ STEPS: tuple[tuple[type[bpy.types.Operator], ...], ...] = (
 def draw_import(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
     """Draw what File ▸ Import gets."""
     for text, pattern in (("OpenDRIVE (.xodr)", OPENDRIVE), ("OpenStreetMap (.osm)", EXTRACTS)):
-        menu.layout.operator(SEIP_OT_choose_map.bl_idname, text=text).filter_glob = pattern
+        menu.layout.operator("seip.choose_map", text=text).filter_glob = pattern
 
 
 def draw_add(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
     """Draw what the menu Add gets."""
     menu.layout.operator_context = "INVOKE_DEFAULT"
-    menu.layout.operator(SEIP_OT_load_example.bl_idname, text="SEIP Example")
-    menu.layout.operator_menu_enum(SEIP_OT_add_area.bl_idname, "role", text="SEIP Area")
+    menu.layout.operator("seip.load_example", text="SEIP Example")
+    menu.layout.operator_menu_enum("seip.add_area", "role", text="SEIP Area")
 
 
 def draw_object(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
@@ -135,7 +84,7 @@ def draw_object(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
 
 
 MENUS = (("TOPBAR_MT_file_import", draw_import), ("VIEW3D_MT_add", draw_add), ("VIEW3D_MT_object", draw_object))
-CLASSES = (SEIP_OT_choose_place, SEIP_FH_opendrive, SEIP_FH_openstreetmap, SEIP_MT_main)
+CLASSES = (SEIP_FH_opendrive, SEIP_FH_openstreetmap, SEIP_MT_main)
 
 
 def attach() -> None:

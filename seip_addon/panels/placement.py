@@ -15,16 +15,15 @@ from ..core.counts import counted, duration_text
 from ..core.output.results.answer import answer, sentence, status_text
 from ..core.output.results.placement_file import parsed_record
 from ..core.output.results.placement_record import PlacementRecord, relevant_warnings
+from ..core.site.obstruction import NO_OBSTACLES_MESSAGE
 from ..core.workflows.traffic_runs import traffic_folder
-from ..operators.placement import SEIP_OT_choose_number, SEIP_OT_judge_placement, SEIP_OT_solve_placement
-from ..operators.results import SEIP_OT_evaluate_sensors, no_placement
-from ..operators.sensors import SEIP_MT_survey_presets, SEIP_OT_add_survey_preset
-from ..operators.visibility import SEIP_OT_compare_scene
+from ..operators.results import no_placement
+from ..operators.sensors import SEIP_MT_survey_presets
+from ..scene.sensors import labelled_sensors
 from ..sensor_edits import sensor_edits
-from .run_button import draw_run
-from .sections import draw_sections
-from .sidebar import RowList, is_narrow, settings_column
-from .wrapped_text import BOX, draw_sentence
+from .sections import BETWEEN, Status, draw_sections
+from .sidebar import RowList, draw_path, draw_run, is_narrow, settings_column
+from .wrapped_text import BOX, draw_lines, draw_sentence, sidebar_width
 
 _SHOWN = {
     "nominal": ("failures",),
@@ -34,6 +33,7 @@ _SHOWN = {
 """Properties of the objective that are shown for each kind of scenarios."""
 
 
+BARE = sentence(NO_OBSTACLES_MESSAGE)
 NAME_SHARE = 0.68
 """Share of a row that the name of a figure takes."""
 NUMBER_SHARE = 0.3
@@ -52,16 +52,23 @@ class SEIP_UL_rules(RowList, bpy.types.UIList):
         row.prop(item, "rule", text="")
 
 
-def status(scene: bpy.types.Scene) -> str:
-    """Return quality, price and certificate of the placement, in the words of the header."""
+def status(scene: bpy.types.Scene) -> Status:
+    """Return quality, price and certificate of the placement for the header, and whether it is out of date."""
+    if scene_status.has_unevaluated(scene):
+        return Status(result=(counted(len(labelled_sensors(scene, hidden=True)), "sensor"), "not evaluated"))
     if no_placement(scene):
-        return "none yet"
-    text = status_text(parsed_record(scene.seip.result.record))
-    return f"{text} · changed" if _doubts(scene) or scene_status.other_goal(scene) else text
+        return Status(result=("none yet",))
+    parts = status_text(parsed_record(scene.seip.result.record)).split(BETWEEN)
+    return Status(is_changed(scene) or bool(scene_status.other_goal(scene)), tuple(parts))
+
+
+def is_changed(scene: bpy.types.Scene) -> bool:
+    """Return whether the placement is known not to be of the scene as it is now."""
+    return any(text != scene_status.NOT_COMPARED for text in _doubts(scene))
 
 
 def _doubts(scene: bpy.types.Scene) -> list[str]:
-    """Return why the placement is not of the scene as it is now."""
+    """Return why the placement is not, or may not be, of the scene as it is now."""
     return [text for text in (scene_status.stale_placement(scene), sensor_edits(scene).describe()) if text]
 
 
@@ -80,13 +87,18 @@ def draw(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     else:
         row.prop(goal, "limit", expand=True)  # an empty text would leave each segment without its name
     column.prop(goal, goal.limit.lower())
-    draw_run(layout, SEIP_OT_solve_placement.bl_idname, text=button_text(scene))
+    draw_run(layout, "seip.solve_placement", text=button_text(scene))
     obstacle = scene_status.obstacle(scene)
     if obstacle:
         draw_sentence(layout, obstacle, icon="ERROR")
+    elif any(one.text == BARE for one in scene.seip.site.problems) and not scene_status.stale_check(scene):
+        draw_sentence(layout, BARE, icon="ERROR")  # the result says little of a real site: not only in a closed section
     if not no_placement(scene):
         _draw_answer(layout, scene)
-    draw_run(layout, SEIP_OT_judge_placement.bl_idname)
+    elif scene_status.has_unevaluated(scene):
+        draw_sentence(layout, scene_status.UNEVALUATED, icon="INFO")
+        draw_run(layout, "seip.evaluate_sensors")
+    draw_run(layout, "seip.judge_placement")
     draw_sections(
         layout,
         {
@@ -118,7 +130,7 @@ def _draw_objective(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
     column.prop(goal, "criterion")
     column.prop(goal, "scenarios")
     if goal.scenarios == "traffic":
-        column.prop(goal, "runs", placeholder=traffic_folder(Path(bpy.data.filepath)).name)
+        draw_path(column, goal, "runs", placeholder=traffic_folder(Path(bpy.data.filepath)).name)
     for name in _SHOWN[goal.scenarios]:
         column.prop(goal, name)
     if goal.scenarios == "nominal" or goal.risk == "none":
@@ -141,7 +153,7 @@ def _draw_rules(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
         row = layout.row()
         rows = len(goal.rules)
         row.template_list(SEIP_UL_rules.bl_idname, "", goal, "rules", goal, "active_rule", rows=rows, maxrows=rows)
-        row.operator("seip.remove_rule", text="", icon="REMOVE")
+        row.operator("seip.remove_entry", text="", icon="REMOVE").of = "RULES"
     layout.prop(goal, "position", text="", icon="VIEWZOOM", placeholder="Position, or the selected pole")
     row = layout.row(align=True)
     row.operator("seip.add_rule", text="Sensor", icon="CHECKMARK").rule = "MANDATORY"
@@ -153,22 +165,20 @@ def _draw_candidates(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None
     survey = scene.seip.survey
     row = layout.row(align=True)
     row.menu(SEIP_MT_survey_presets.__name__, text=SEIP_MT_survey_presets.bl_label)
-    row.operator(SEIP_OT_add_survey_preset.bl_idname, text="", icon="ADD")
-    row.operator(SEIP_OT_add_survey_preset.bl_idname, text="", icon="REMOVE").remove_active = True
-    column = settings_column(layout)
+    row.operator("seip.add_survey_preset", text="", icon="ADD")
+    row.operator("seip.add_survey_preset", text="", icon="REMOVE").remove_active = True
     for heading, names in (
-        ("", ("grid", "delta")),
+        ("Road", ("grid", "delta")),
         ("Positions", ("spacing", "allow")),
-        ("Weather", ("rain", "wet_road", "fog")),
+        ("Weather", ("rain", "wet_road", "fog", *(["visibility"] if survey.fog else []))),
+        ("Price", ("installed",)),
     ):
-        group = column.column(heading=heading)
+        layout.label(text=heading)
+        group = settings_column(layout)
         for name in names:
             group.prop(survey, name)
-    if survey.fog:
-        column.prop(survey, "visibility")
-    column.prop(survey, "installed")
     if survey.installed:
-        column.prop(survey, "installed_cost", placeholder="Shipped")
+        draw_path(layout, survey, "installed_cost", placeholder="Shipped")
 
 
 def _draw_search(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
@@ -188,9 +198,9 @@ def _draw_answer(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
         draw_sentence(box, text, icon="ERROR", reserved=BOX)
     stale = scene_status.stale_placement(scene)
     if stale and stale != scene_status.ANOTHER_SITE:
-        draw_run(box, SEIP_OT_compare_scene.bl_idname)
+        draw_run(box, "seip.compare_scene")
     if sensor_edits(scene).describe():
-        draw_run(box, SEIP_OT_evaluate_sensors.bl_idname)
+        draw_run(box, "seip.evaluate_sensors")
     other_goal = "" if doubts else scene_status.other_goal(scene)
     if other_goal:
         draw_sentence(box, other_goal, icon="INFO", reserved=BOX)
@@ -215,7 +225,7 @@ def _draw_numbers(
     for count, share, text in numbers(record):
         row = column.split(factor=NUMBER_SHARE, align=True)
         button = row.operator(
-            SEIP_OT_choose_number.bl_idname,
+            "seip.choose_number",
             text=str(count),
             icon="CHECKMARK" if count == len(record.sensors) else "BLANK1",
             depress=goal.limit == "COUNT" and goal.count == count,
@@ -262,8 +272,8 @@ def _draw_details(layout: bpy.types.UILayout, record: PlacementRecord, *, certai
         column = layout.column(align=True)
         for name, value in lines:
             row = column.split(factor=NAME_SHARE)
-            row.label(text=f"  {name}", translate=False)
-            row.label(text=value, translate=False)
+            draw_sentence(row, name, reserved=BOX + (1.0 - NAME_SHARE) * sidebar_width())
+            draw_lines(row, [value])
     if certain:
         objective, notes = record.objective, record.notes
         proven = objective.status == "optimal" and not purpose(notes)  # of the coverage that is shown above
@@ -282,7 +292,7 @@ def figures(record: PlacementRecord) -> dict[str, list[tuple[str, str]]]:
     if objective.kind == "weighted":
         seen.append(("By weight", f"{coverage.weighted:.2%}"))
     if coverage.gain_band is not None and coverage.gain_band.sheets:
-        seen.append(("Plausible gains", f"{coverage.gain_band.low:.0%} to {coverage.gain_band.high:.0%}"))
+        seen.append(("With plausible gains", f"{coverage.gain_band.low:.0%} to {coverage.gain_band.high:.0%}"))
     returns: list[tuple[str, str]] = []
     crossings: list[tuple[str, str]] = []
     if record.returns is not None:
@@ -291,8 +301,8 @@ def figures(record: PlacementRecord) -> dict[str, list[tuple[str, str]]]:
     price = [(sensor.id, f"${sensor.price_usd:,.0f}") for sensor in record.sensors]
     return {
         "Seen": seen,
-        "Returns in Each Turn": returns,
-        "Returns at Worst Point": crossings,
+        "Returns in Each Revolution": returns,
+        "Pedestrian's Returns at Worst Point": crossings,
         "Price": [*price, ("Total", record.price_text)],
     }
 

@@ -4,6 +4,7 @@ import bpy
 
 from .. import preferences
 from ..core.sensing.visibility.ray_casting import MAX_THREADS
+from ..core.workflows.detection import INSTALL
 from ..core.world.openstreetmap.overpass import OVERPASS
 from . import sumo
 
@@ -36,8 +37,7 @@ class SEIP_AP_preferences(bpy.types.AddonPreferences):
     python: bpy.props.StringProperty(
         name="Python with PyTorch",
         subtype="FILE_PATH",
-        description="Python for Detect: .venv/bin/python of a checkout of this project after `make detection`, "
-        "or one of your own after `pip install '.[detection]'` there",
+        description=f"Python for Detect, .venv/bin/python of a checkout or one of your own: {INSTALL}",
     )
     sumo: bpy.props.StringProperty(
         name="SUMO",
@@ -71,9 +71,7 @@ class SEIP_AP_preferences(bpy.types.AddonPreferences):
             row = layout.row(align=True)
             row.prop(file, "path", text="")
             row.operator("seip.remove_catalogue", text="", icon="X").index = number
-        row = layout.row(align=True)
-        row.operator("seip.add_catalogue", icon="ADD")
-        row.operator("seip.list_sensor_types", icon="FILE_REFRESH")
+        layout.operator("seip.add_catalogue", icon="ADD")
 
 
 CLASSES = (SEIP_PG_catalogue_file, SEIP_AP_preferences)

@@ -1,22 +1,93 @@
-"""The section "Results": placed sensors, coverage colours, comparison."""
+"""The section "Results": placed sensors, coverage colours and sight lines, comparison."""
 
 from __future__ import annotations
 
 import bpy
 
-from ..core.choosing.placement.returns_summary import returns_text
+from ..core.choosing.placement.returns_summary import SURFACE_SEEN, returns_text
 from ..core.errors import SeipError
+from ..core.output.pictures.coverage_colours import Aspect
 from ..core.output.results.comparison import BOTH, CLASS_WORDS, KEPT_ONLY, NEITHER, PRESENT_ONLY, compared_shares
 from ..core.output.results.placement_file import parsed_record
 from ..core.output.results.placement_record import PlacementRecord
 from ..core.sensing.lidar.model import short_name
 from ..operators import results
+from ..operators.results import no_placement
+from ..operators.view import (
+    why_no_coverage,
+)
+from ..scene.write import ASPECT, aspects_of, coverage_of
 from ..session import FollowedSensors, session
-from . import view
-from .run_button import draw_run
-from .sections import draw_sections
-from .sidebar import RowList
+from ..viewport import coverage, overlays
+from ..viewport.point_cloud import NAME as CLOUD
+from ..viewport.sight_lines import NAME as SIGHT
+from . import placement
+from .sections import Status, draw_sections
+from .sidebar import RowList, draw_run, is_running
 from .wrapped_text import draw_sentence
+
+ASPECTS: dict[Aspect, str] = {"returns": "Returns", "seen": "Seen", "times": "Sensors", "weights": "Weights"}
+"""What the buttons of the colours say."""
+
+
+def draw_view(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+    """Draw what can be shown."""
+    scene = context.scene
+    if why_no_coverage(scene) and no_placement(scene) and session.of(scene).scan is None:
+        draw_sentence(layout, "There is nothing to show yet.", icon="INFO")
+        return
+    _draw_coverage(layout, context)
+    _draw_sight(layout, context)
+    if session.of(scene).scan is not None:
+        _draw_cloud(layout, context)
+
+
+def _draw_coverage(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+    column = layout.column(align=True)
+    head = column.row()
+    head.label(text="Coverage")
+    head.prop(context.scene.seip.view, "legend", text="", icon="INFO")
+    obj = coverage_of(context.scene)
+    row = column.row(align=True)
+    possible = ASPECTS if obj is None else aspects_of(obj)
+    for aspect, words in ASPECTS.items():
+        if aspect not in possible:
+            continue
+        now = obj is not None and obj.get(ASPECT) == aspect
+        button = row.operator("seip.colour_coverage", text=words, depress=now)
+        button.aspect = aspect
+    if obj is not None and "returns" in possible and obj.get(ASPECT) in {"seen", "times"}:
+        draw_sentence(column, SURFACE_SEEN, icon="INFO")
+    why_not = why_no_coverage(context.scene)
+    if why_not:
+        draw_sentence(column, why_not, icon="INFO")
+    elif not coverage.shows_coverage(context.space_data):
+        text = "This view's shading does not show the colours: press one of them."
+        draw_sentence(column, text, icon="ERROR")
+
+
+def _draw_sight(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+    column = layout.column(align=True)
+    column.label(text="Sight Lines")
+    overlay = overlays.find(context.scene, SIGHT)
+    row = column.row(align=True)
+    words = "From Sensor" if overlay is None else overlay.about
+    row.operator_menu_enum("seip.show_sight_lines", "sensor", text=words, icon="LIGHT_SPOT")
+    if overlay is not None:
+        row.operator("seip.hide_overlay", text="", icon="X").name = SIGHT
+    if is_running("seip.show_sight_lines"):
+        draw_run(column, "seip.show_sight_lines")
+    why_not = no_placement(context.scene)
+    if why_not:
+        draw_sentence(column, why_not, icon="INFO")
+
+
+def _draw_cloud(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+    column = layout.column(align=True)
+    column.label(text="Point Cloud")
+    column.row(align=True).prop(context.scene.seip.view, "cloud_colour", expand=True)
+    column.operator("seip.hide_overlay", icon="X").name = CLOUD
+
 
 SENSOR_SHARE = 0.72
 """Share of a row of the list that a sensor takes, beside what it sees."""
@@ -52,12 +123,19 @@ class SEIP_UL_kept(RowList, bpy.types.UIList):
         layout.prop(item, "name", text="", emboss=False)
 
 
+def status(scene: bpy.types.Scene) -> Status:
+    """Return whether the placement is out of date."""
+    return Status(not results.no_placement(scene) and placement.is_changed(scene))
+
+
 def draw(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     """Draw the sensors and how they are followed when moved, then the closed sections."""
     scene = context.scene
     sentence = results.no_placement(scene)
     if sentence:
         draw_sentence(layout, sentence, icon="INFO")
+        if coverage_of(scene) is not None:
+            draw_sections(layout, {"view": draw_view}, context)
         return
     result = scene.seip.result
     heading = layout.split(factor=SENSOR_SHARE)
@@ -67,11 +145,11 @@ def draw(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     label = result.sensors[result.active_sensor].name if 0 <= result.active_sensor < len(result.sensors) else ""
     layout.operator("seip.look_from_sensor", icon="HIDE_OFF", text=f"View from {label or 'Sensor'}")
     if session.following is None:
-        draw_run(layout, results.SEIP_OT_follow_sensors.bl_idname, icon="ORIENTATION_GLOBAL")
+        draw_run(layout, "seip.follow_sensors", icon="ORIENTATION_GLOBAL")
     else:
         layout.operator("seip.follow_sensors", text="Stop Following", icon="PAUSE", depress=True)
         _draw_followed(layout, session.following)
-    draw_sections(layout, {"view": view.draw, "comparison": _draw_comparison}, context)
+    draw_sections(layout, {"view": draw_view, "comparison": _draw_comparison}, context)
 
 
 def _draw_list(
@@ -110,7 +188,7 @@ def _draw_comparison(layout: bpy.types.UILayout, context: bpy.types.Context) -> 
     _draw_list(row, SEIP_UL_kept, seip, "kept", "active_kept")
     column = row.column(align=True)
     column.operator("seip.keep_placement", text="", icon="ADD")
-    column.operator("seip.drop_placement", text="", icon="REMOVE")
+    column.operator("seip.remove_entry", text="", icon="REMOVE").of = "KEPT"
     if not 0 <= seip.active_kept < len(seip.kept):
         draw_sentence(layout, "Keep this placement with +, place again, and compare the two.", icon="INFO")
         return

@@ -1,4 +1,4 @@
-"""The step "Sensors": products to choose from, mounting heights and tilts."""
+"""The step "Sensors": the table of products, those to choose from, mounting heights and tilts."""
 
 from __future__ import annotations
 
@@ -9,32 +9,121 @@ import bpy
 from .. import sensor_types
 from ..core.output.results.placement_file import parsed_record
 from ..core.sensing.lidar.model import LidarModel
+from ..core.sensing.returns.bodies import PANELS
 from ..core.sensing.visibility.ring_resolution import unresolved_from
-from ..core.sensing.visibility.road_range import road_range
+from ..core.sensing.visibility.road_range import road_range, upright_range
 from ..core.sensing.visibility.settings import VisibilitySettings
+from ..operators.base import Outcome
 from ..operators.results import no_placement
-from ..operators.sensors import SEIP_OT_about_sensor, SEIP_OT_drop_sensor_type, SEIP_OT_preview_beams
 from ..scene.materials import REFLECTIVITY
 from ..session import session
 from ..viewport import beam_preview
-from .sections import draw_sections
-from .sensor_table import SEIP_OT_choose_sensors, pedestrian_range
+from .sections import Status, draw_sections
 from .sidebar import is_narrow, settings_column
 from .wrapped_text import draw_sentence
 
+TABLE_WIDTH = 760
+"""Width of the table, pixels at the usual scale of the interface."""
+COLUMNS = (("Sensor", 0.40), ("Channels", 0.11), ("Field of view", 0.14), ("Pedestrian", 0.12), ("Price", 0.11))
+"""Titles and shares of the width; the rest shows what the detection law rests on."""
 
-def status(scene: bpy.types.Scene) -> str:
-    """Return the placed sensors, or the types to choose from and their heights, in the words of the header."""
+
+class SEIP_OT_choose_sensors(bpy.types.Operator):
+    """Choose the sensors that a placement may use, from a table of all products"""
+
+    bl_idname = "seip.choose_sensors"
+    bl_label = "Choose Sensors…"
+    bl_options = {"REGISTER", "UNDO"}
+
+    def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> Outcome:
+        """Show the table."""
+        sensor_types.refresh()
+        context.scene.seip.survey.filter = ""
+        outcome: Outcome = context.window_manager.invoke_popup(self, width=TABLE_WIDTH)
+        return outcome
+
+    def execute(self, _context: bpy.types.Context) -> Outcome:
+        """Keep the choice, which the table has made."""
+        return {"FINISHED"}
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Draw the filter, and a row for each product."""
+        survey, layout = context.scene.seip.survey, self.layout
+        layout.prop(survey, "filter", text="", icon="VIEWZOOM", placeholder="Manufacturer or product")
+        draw_table(layout, survey)
+        layout.operator("seip.add_catalogue", icon="ADD")
+
+
+def draw_table(layout: bpy.types.UILayout, survey: bpy.types.PropertyGroup) -> None:
+    """Draw the titles, and a row for each product whose name contains the filter."""
+    wanted = survey.filter.casefold()
+    shown = [key for key in sensor_types.in_order() if wanted in f"{key} {_title_of(key)}".casefold()]
+    _row(layout, None, (*(title for title, _ in COLUMNS), "Detection law"))
+    column = layout.column(align=True)
+    column.scale_y = 0.85
+    for key in shown:
+        _row(column, survey.types.get(key), _cells(session.sensor_types[key]))
+    if not shown:
+        column.label(text="No product has this in its name.", icon="INFO")
+
+
+def _row(layout: bpy.types.UILayout, item: bpy.types.PropertyGroup | None, cells: tuple[str, ...]) -> None:
+    rest, left = layout.row(align=True), 1.0
+    for number, text in enumerate(cells):
+        if number < len(COLUMNS):
+            share = COLUMNS[number][1]
+            rest = rest.split(factor=share / left)
+            left -= share
+        if number == 0 and item is not None:
+            rest.prop(item, "use", text=text, translate=False)
+        else:
+            rest.label(text=text, translate=False)
+
+
+def _title_of(key: str) -> str:
+    return sensor_types.title(session.sensor_types[key])
+
+
+def _cells(model: LidarModel) -> tuple[str, ...]:
+    low, high = math.degrees(model.elevations.min()), math.degrees(model.elevations.max())
+    across = math.degrees(model.field_of_view)
+    return (
+        sensor_types.title(model),
+        "rosette" if model.rosette is not None else f"{model.channels}",
+        f"{across:.0f}° × {high - low:.0f}°",
+        f"{pedestrian_range(model):.0f} m",
+        f"${model.price:,.0f}",
+        _law(model),
+    )
+
+
+def _law(model: LidarModel) -> str:
+    if model.manufacturer == sensor_types.PAPER:
+        return "paper's model"
+    if model.calibration:
+        return "calibrated"
+    return "data sheet"
+
+
+def pedestrian_range(model: LidarModel) -> float:
+    """Return the distance in metres up to which a return from a pedestrian is detected with the usual probability."""
+    return upright_range(model, PANELS["pedestrian"].reflected, VisibilitySettings())
+
+
+def status(scene: bpy.types.Scene) -> Status:
+    """Return the placed sensors for the header, or the types to choose from and their heights."""
     survey = scene.seip.survey
+    used, heights = survey.used_types(), survey.parsed_heights()
     if not no_placement(scene):
-        placed = parsed_record(scene.seip.result.record).sensors
-        heights = sorted({sensor.height_m for sensor in placed})
-        names = {sensor.sensor for sensor in placed}
-        return f"{len(placed)} × {_names(sorted(names))} at {_span(heights)}"
-    used = survey.used_types()
+        record = parsed_record(scene.seip.result.record)
+        names = sorted({sensor.sensor for sensor in record.sensors})
+        placed_heights = sorted({sensor.height_m for sensor in record.sensors})
+        candidates = record.request.candidates
+        changed = (tuple(used), tuple(heights)) != (candidates.sensors, candidates.heights)
+        return Status(changed, (f"{len(record.sensors)} × {_names(names)}", f"at {_span(placed_heights)}"))
     if not used:
-        return "none chosen"
-    return f"{_names(used)} at {'?' if survey.wrong_heights() else _span(survey.parsed_heights())}"
+        return Status(result=("none chosen",))
+    return Status(result=(_names(used), f"at {_span(heights)}" if heights else "no valid height"))
 
 
 def _names(keys: list[str]) -> str:
@@ -75,8 +164,9 @@ def _draw_product(layout: bpy.types.UILayout, key: str) -> None:
         price = row.row(align=True)
         price.alignment = "RIGHT"
         price.label(text=f"${model.price:,.0f}", translate=False)
-    row.operator(SEIP_OT_about_sensor.bl_idname, text="", icon="INFO", emboss=False).key = key
-    row.operator(SEIP_OT_drop_sensor_type.bl_idname, text="", icon="X", emboss=False).key = key
+    item = bpy.context.scene.seip.survey.types.get(key)
+    if item is not None:
+        row.prop(item, "use", text="", icon="X", emboss=False)
 
 
 def _draw_mounting(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
@@ -89,18 +179,12 @@ def _draw_mounting(layout: bpy.types.UILayout, context: bpy.types.Context) -> No
         row.prop(survey, name, text=name.capitalize() if is_narrow(context) else None)
         if wrong:
             draw_sentence(column, wrong, icon="ERROR", alert=True)
-    if any(_looks_one_way(key) for key in survey.used_types()):
-        column.prop(survey, "yaws")
-
-
-def _looks_one_way(key: str) -> bool:
-    model = session.sensor_types.get(key)
-    return model is not None and not model.all_round
 
 
 def _draw_about(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     """Draw the figures of a chosen product, and what they rest on."""
     survey = context.scene.seip.survey
+    layout.prop_search(survey, "about", survey, "types", text="", icon="VIEWZOOM")
     model = session.sensor_types.get(survey.shown_type())
     if model is None:
         draw_sentence(layout, "Choose a sensor that is in the catalogue.", icon="INFO")
@@ -162,7 +246,7 @@ def _draw_beams(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     shown = beam_preview.is_shown()
     settings_column(layout).prop(context.scene.seip.survey, "preview_height")
     text = "Hide Beams" if shown else "Show Beams"
-    layout.operator(SEIP_OT_preview_beams.bl_idname, text=text, icon="LIGHT_SPOT", depress=shown)
+    layout.operator("seip.preview_beams", text=text, icon="LIGHT_SPOT", depress=shown)
     preview = beam_preview.preview_of(context) if shown else None
     if preview is None:
         return
@@ -174,3 +258,6 @@ def _draw_beams(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     draw_sentence(layout, "Orange: more; road between may go unseen", icon="COLORSET_02_VEC")
     before = " in front" if preview.tilt else ""
     draw_sentence(layout, f"A level road{before} has no gaps up to {preview.resolved_to():.0f} m.")
+
+
+CLASSES = (SEIP_OT_choose_sensors,)

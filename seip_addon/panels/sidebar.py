@@ -1,11 +1,53 @@
-"""Mixins of the sidebar's panels and lists."""
+"""Parts of the sidebar: mixins of panels and lists, columns, paths, and buttons that show progress."""
 
 from __future__ import annotations
 
 import bpy
 
+from .. import scene_status
+from ..core.progress import progress_line
+from ..session import session
 from ..viewport.overlays import TAB
+from .wrapped_text import MARGIN, draw_sentence, sidebar_width, text_width
 
+
+def draw_run(
+    layout: bpy.types.UILayout,
+    operator: str,
+    icon: str = "NONE",
+    text: str | None = None,
+    *,
+    in_one_row: bool = False,
+) -> None:
+    """Draw an operator's button, or in its place the progress of its work; the button of the next step is emphasised.
+
+    The progress is a row that takes the place of the button, with the time in its bar, and a sentence below unless
+    there is only one row.
+    """
+    running = session.running
+    row = layout.row(align=True)
+    if running is None or not is_running(operator):
+        row.active_default = scene_status.next_step(bpy.context.scene) == operator
+        row.operator(operator, icon=icon, text=text)
+        return
+    progress, duration = running.shown
+    row.progress(factor=progress.done / progress.total if progress.total else 0.0, text=duration)
+    if running.acceptance is not None and running.acceptance.searching:
+        row.operator("seip.accept", text="", icon="CHECKMARK")
+    row.operator("seip.stop", text="", icon="X")
+    if in_one_row:
+        return
+    line = progress_line(progress)
+    draw_sentence(layout, f"{line[:1].upper()}{line[1:]}")
+
+
+def is_running(operator: str) -> bool:
+    """Return whether an operator's work is under way."""
+    return session.running is not None and session.running.operator == operator
+
+
+FIELD = 34.0
+"""Width that the margins of a field and its button for files take, pixels at the interface's usual scale."""
 NARROW = 250
 """Pixels at the interface's usual scale."""
 
@@ -45,6 +87,25 @@ def settings_column(layout: bpy.types.UILayout) -> bpy.types.UILayout:
     column.use_property_split = not is_narrow(bpy.context)
     column.use_property_decorate = False
     return column
+
+
+def draw_path(
+    layout: bpy.types.UILayout,
+    owner: bpy.types.PropertyGroup,
+    name: str,
+    placeholder: str = "",
+    *,
+    named: bool = True,
+) -> None:
+    """Draw a file or folder over the whole width, and below the field again if it has no room there."""
+    column = layout.column(align=True)
+    column.use_property_split = False
+    if named:
+        column.label(text=owner.bl_rna.properties[name].name)
+    column.prop(owner, name, text="", placeholder=placeholder)
+    path = getattr(owner, name)
+    if text_width(path) > sidebar_width() - MARGIN - FIELD:
+        draw_sentence(column, path)
 
 
 def is_narrow(context: bpy.types.Context) -> bool:

@@ -6,16 +6,9 @@ import bpy
 
 from .. import preferences, scene_status
 from ..core.site.roles import Role
+from ..operators.base import Outcome
 from ..operators.site import (
-    SEIP_OT_add_area,
-    SEIP_OT_assign_role,
     SEIP_OT_build_site,
-    SEIP_OT_check_site,
-    SEIP_OT_choose_map,
-    SEIP_OT_download_map,
-    SEIP_OT_load_example,
-    SEIP_OT_show_problem,
-    SEIP_OT_take_out_of_role,
     has_site,
     in_short,
     is_of_choice,
@@ -24,23 +17,30 @@ from ..operators.site import (
 from ..properties.site import SEIP_PG_site
 from ..scene import roles
 from . import sumo
-from .run_button import draw_run
-from .sections import draw_sections
-from .sidebar import is_narrow, settings_column
-from .wrapped_text import draw_sentence
+from .sections import Status, draw_sections
+from .sidebar import draw_path, draw_run, is_narrow, settings_column
+from .wrapped_text import ICON, MARGIN, draw_lines, draw_sentence, wrapped
 
 TARGETS = "Targets"
 """Count of the check that the header shows."""
+DIALOG_WIDTH = 420
+"""Width of the dialog of an import, pixels at the usual scale of the interface."""
+MESSAGE_LINES = 5
+"""Lines of that dialog for a message: as many as the longest takes."""
 SHOW_WIDTH = 28.0
 """Width of the button next to a problem, pixels at the usual scale of the interface."""
 
 
-def status(scene: bpy.types.Scene) -> str:
-    """Return the name of the site and its number of targets, in the words of the header."""
+def status(scene: bpy.types.Scene) -> Status:
+    """Return the problems that the check found, the number of targets and the name of the site for the header."""
     if scene_status.has_nothing(scene):
-        return "none yet"
-    targets = next((one.value.partition(", ")[0] for one in scene.seip.site.counts if one.name == TARGETS), "")
-    return f"{scene.name} · {targets} points" if targets else scene.name
+        return Status(result=("none yet",))
+    site = scene.seip.site
+    if not site.checked:
+        return Status(result=("not checked", scene.name))
+    targets = (f"{one.value.partition(', ')[0]} points" for one in site.counts if one.name == TARGETS)
+    doubt = scene_status.stale_check(scene)
+    return Status(doubt not in {"", scene_status.OLD_CHECK}, (in_short(site.problems), *targets, scene.name))
 
 
 def draw(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
@@ -50,7 +50,7 @@ def draw(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
         ways = "Paste a place, choose a map, load the example, or give roles to your own objects."
         draw_sentence(layout, ways, icon="INFO")
         _draw_map(layout, scene)
-        draw_run(layout, SEIP_OT_load_example.bl_idname, icon="MOD_BUILD")
+        draw_run(layout, "seip.load_example", icon="MOD_BUILD")
     else:
         _draw_check(layout, scene)
         draw_sections(layout, {"contents": _draw_contents, "change_site": _draw_map}, scene)
@@ -61,17 +61,21 @@ def _draw_map(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
     site = scene.seip.site
     name = bpy.path.basename(site.source)
     _draw_download(layout, site)
-    draw_run(layout, SEIP_OT_choose_map.bl_idname, icon="FILE_FOLDER", text=name or "Choose Map…")
+    draw_run(layout, "seip.choose_map", icon="FILE_FOLDER", text=name or "Choose Map…")
     if not name:
         return
+    if len(site.junctions) > 1:
+        layout.operator("seip.choose_map", icon="VIEWZOOM", text="Pick on Map…").filepath = site.source
     if site.is_extract():
-        draw_pick(layout, site)
-    draw_place(layout, site)
+        sumo.draw_missing(layout)
+    _draw_place(layout, site)
+    draw_sentence(layout, _place_text(site), icon="INFO")
+    draw_sections(layout, {"sources": _draw_sources}, site)
     if has_site(scene) and not missing_for_build(scene):
         again = "The site is built again; your own objects and the sensors stay."
         elsewhere = "The site is built in a new scene; this one stays."
         draw_sentence(layout, again if is_of_choice(scene) else elsewhere, icon="INFO")
-    draw_run(layout, SEIP_OT_build_site.bl_idname)
+    draw_run(layout, "seip.build_site")
 
 
 def _draw_download(layout: bpy.types.UILayout, site: SEIP_PG_site) -> None:
@@ -83,25 +87,51 @@ def _draw_download(layout: bpy.types.UILayout, site: SEIP_PG_site) -> None:
         reason = preferences.why_no_download()
         if reason:
             draw_sentence(layout, f"{reason}.", icon="ERROR")
-        draw_run(layout, SEIP_OT_download_map.bl_idname, icon="WORLD")
+        draw_run(layout, "seip.download_map", icon="WORLD")
 
 
-def draw_pick(layout: bpy.types.UILayout, site: SEIP_PG_site) -> None:
-    """Draw the button that shows the chosen extract as a map to pick a junction on."""
-    button = layout.operator(SEIP_OT_choose_map.bl_idname, icon="VIEWZOOM", text="Pick on Map…")
-    button.filepath = site.source
+class SEIP_OT_choose_place(bpy.types.Operator):
+    """Choose the junction of the site, and the length of its streets"""
+
+    bl_idname = "seip.choose_place"
+    bl_label = "Import Site"
+    bl_options = {"INTERNAL"}
+
+    def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> Outcome:
+        """Ask."""
+        outcome: Outcome = context.window_manager.invoke_props_dialog(
+            self, width=DIALOG_WIDTH, confirm_text=SEIP_OT_build_site.bl_label
+        )
+        return outcome
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Draw the file, the choice of the place, and what is missing: no choice adds or removes a row."""
+        site, layout = context.scene.seip.site, self.layout
+        layout.label(text=bpy.path.basename(site.source), icon="FILE", translate=False)
+        _draw_place(layout, site)
+        _draw_sources(layout, site)
+        if site.is_extract() and preferences.sumo() is None:
+            sumo.draw_installation(layout, in_one_row=True)
+        elif site.is_extract():
+            layout.label(text="SUMO lays out the streets.", icon="CHECKMARK")
+        missing = missing_for_build(context.scene)
+        if missing == preferences.NO_SUMO and preferences.why_no_installation():
+            missing = f"{missing}. {preferences.why_no_installation()}"
+        text, icon = (f"{missing}.", "ERROR") if missing else (_place_text(site), "INFO")
+        lines = wrapped(text, MARGIN + ICON, DIALOG_WIDTH)
+        draw_lines(layout, lines + [""] * (MESSAGE_LINES - len(lines)), icon)
+
+    def execute(self, context: bpy.types.Context) -> Outcome:
+        """Build the site, or show the dialog again, with what is missing."""
+        if missing_for_build(context.scene) and not bpy.app.background:
+            bpy.ops.seip.choose_place("INVOKE_DEFAULT")
+            return {"CANCELLED"}
+        bpy.ops.seip.build_site("INVOKE_DEFAULT")
+        return {"FINISHED"}
 
 
-def draw_place(layout: bpy.types.UILayout, site: SEIP_PG_site, width: float | None = None) -> None:
-    """Draw the choice of a place in the chosen file and how large the site is; no choice adds or removes a row.
-
-    Parameters
-    ----------
-    width : float, optional
-        Width of a dialog, as for `draw_sentence`.
-    """
-    if site.is_extract():
-        sumo.draw_missing(layout, width)
+def _draw_place(layout: bpy.types.UILayout, site: SEIP_PG_site) -> None:
+    """Draw the choice of a place in the chosen file and how large the site is."""
     column = settings_column(layout)
     column.prop_search(site, "junction", site, "junctions", icon="DECORATE_DRIVER")
     if site.is_extract():
@@ -115,36 +145,37 @@ def draw_place(layout: bpy.types.UILayout, site: SEIP_PG_site, width: float | No
     shape.enabled = bool(site.junction) or site.is_extract()
     shape.prop(site, "region_shape")
     size.prop(site, "radius", text="Along Them" if site.follows_approaches() else "Radius")
-    draw_sentence(layout, _place_text(site), icon="INFO", width=width)
-    draw_sections(layout, {"sources": _draw_sources}, site)
 
 
 def _draw_sources(layout: bpy.types.UILayout, site: SEIP_PG_site) -> None:
-    """Draw further files of the site, each with the settings that say where it lies."""
-    column = settings_column(layout)
-    row = column.row()
+    """Draw further files of the site."""
+    row = layout.row()
     row.enabled = not site.is_extract()  # which has its own buildings, trees and posts
-    row.prop(site, "osm")
-    column.prop(site, "terrain")
-    if site.terrain:
-        column.prop(site, "terrain_epsg")
+    draw_path(row, site, "osm")
+    draw_path(layout, site, "terrain")
+    row = settings_column(layout)
+    row.enabled = bool(site.terrain)
+    row.prop(site, "terrain_epsg")
 
 
 def _place_text(site: SEIP_PG_site) -> str:
-    """Return which place is chosen, in so few words that it is one line for every choice."""
+    """Return which place is chosen, or what is wrong with the choice."""
     if site.junction:
         return "The place: this junction."
     if site.is_described():
         return "The description's own place."
     if not site.is_extract():
         return "The middle of the map."
-    return "The place: this position." if site.position else "No place is chosen yet."
+    if not site.position:
+        return "No place is chosen yet."
+    wrong = site.wrong_position(site.position)
+    return f"{wrong}." if wrong else "The place: this position."
 
 
 def _draw_check(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
     """Draw the button and one line, and the problems with a button each."""
     site = scene.seip.site
-    draw_run(layout, SEIP_OT_check_site.bl_idname)
+    draw_run(layout, "seip.check_site")
     if not site.checked:
         return
     doubt = scene_status.stale_check(scene)
@@ -161,7 +192,7 @@ def _draw_check(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
         draw_sentence(row.column(), problem.text, icon="CANCEL" if problem.is_error else "ERROR", reserved=SHOW_WIDTH)
         button = row.row()
         button.enabled = bool(problem.name)
-        button.operator(SEIP_OT_show_problem.bl_idname, text="", icon="ZOOM_SELECTED").number = number
+        button.operator("seip.show_problem", text="", icon="ZOOM_SELECTED").number = number
 
 
 def _draw_contents(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
@@ -177,12 +208,13 @@ def _draw_roles(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     site = context.scene.seip.site
     layout.prop(site, "role", text="")
     row = layout.row(align=True)
-    row.operator(SEIP_OT_assign_role.bl_idname, icon="ADD").role = site.role
-    row.operator(SEIP_OT_take_out_of_role.bl_idname, icon="REMOVE").role = site.role
+    row.operator("seip.assign_role", icon="ADD").role = site.role
+    button = row.operator("seip.assign_role", text="Remove", icon="REMOVE")
+    button.role, button.remove = site.role, True
     if Role[site.role] in roles.AREAS:
         row = layout.column(align=True) if is_narrow(context) else layout.row(align=True)
         for place, text in (("CURSOR", "Draw at Cursor"), ("VIEW", "Draw in View")):
-            button = row.operator(SEIP_OT_add_area.bl_idname, text=text)
+            button = row.operator("seip.add_area", text=text)
             button.role, button.place = site.role, place
     if context.object is None:
         draw_sentence(layout, "Select objects to give them a role.", icon="INFO")
@@ -200,3 +232,6 @@ def _draw_object(layout: bpy.types.UILayout, scene: bpy.types.Scene, obj: bpy.ty
         column.prop(obj, "seip_region_weight")
     if Role.POLES in assigned:
         column.prop(obj, "seip_pole_rule")
+
+
+CLASSES = (SEIP_OT_choose_place,)

@@ -21,7 +21,9 @@ class SEIP_PT_steps(Sidebar, bpy.types.Panel):
         status = {name: step.status(context.scene) for name, step in steps.items()}
         draw_sections(self.layout, {name: step.draw for name, step in steps.items()}, context, status)
         self.layout.separator(type="LINE")
-        draw_sections(self.layout, {"results": results.draw, "traffic": traffic.draw, "export": export.draw}, context)
+        after = {"results": results, "traffic": traffic, "export": export}
+        status = {name: part.status(context.scene) for name, part in after.items() if part is not export}
+        draw_sections(self.layout, {name: part.draw for name, part in after.items()}, context, status)
 
 
 CLASSES = (SEIP_PT_steps,)

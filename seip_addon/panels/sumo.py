@@ -6,23 +6,17 @@ import bpy
 
 from .. import preferences
 from ..core.sumo_installation import sumo_size
-from ..operators.sumo import SEIP_OT_install_sumo
-from .run_button import draw_run
+from ..operators.simulation import SEIP_OT_install_sumo
+from .sidebar import draw_run
 from .wrapped_text import draw_sentence
 
 
-def draw_missing(layout: bpy.types.UILayout, width: float | None = None) -> None:
-    """Draw that SUMO is missing, and the ways to get it; nothing where it is there.
-
-    Parameters
-    ----------
-    width : float, optional
-        Width of a dialog, as for `draw_sentence`.
-    """
+def draw_missing(layout: bpy.types.UILayout) -> None:
+    """Draw that SUMO is missing, and the ways to get it; nothing where it is there."""
     if preferences.sumo() is not None:
         return
-    draw_sentence(layout, f"{preferences.NO_SUMO}.", icon="ERROR", width=width)
-    _draw_installation(layout, width)
+    draw_sentence(layout, f"{preferences.NO_SUMO}.", icon="ERROR")
+    draw_installation(layout)
     if preferences.own() is not None:
         layout.operator("preferences.addon_show", text="Preferences").module = preferences.ADDON_ID
 
@@ -32,12 +26,13 @@ def draw_status(layout: bpy.types.UILayout) -> None:
     status, works = preferences.sumo_status()
     draw_sentence(layout, f"{status}.", icon="CHECKMARK" if works else "ERROR")
     if not works:
-        _draw_installation(layout)
+        draw_installation(layout)
 
 
-def _draw_installation(layout: bpy.types.UILayout, width: float | None = None) -> None:
-    reason, size = preferences.why_no_installation(), sumo_size()
+def draw_installation(layout: bpy.types.UILayout, *, in_one_row: bool = False) -> None:
+    """Draw the button that installs SUMO, and why it cannot where there is more than one row."""
+    reason = "" if in_one_row else preferences.why_no_installation()
     if reason:
-        draw_sentence(layout, f"{reason}.", icon="INFO", width=width)
-    text = f"{SEIP_OT_install_sumo.bl_label} ({size.download} MB)"
-    draw_run(layout, SEIP_OT_install_sumo.bl_idname, icon="IMPORT", text=text)
+        draw_sentence(layout, f"{reason}.", icon="INFO")
+    text = f"{SEIP_OT_install_sumo.bl_label} ({sumo_size().download} MB)"
+    draw_run(layout, "seip.install_sumo", icon="IMPORT", text=text, in_one_row=in_one_row)

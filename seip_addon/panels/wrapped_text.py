@@ -27,22 +27,24 @@ def draw_sentence(
     icon: str = "NONE",
     alert: bool = False,
     reserved: float = 0.0,
-    width: float | None = None,
 ) -> None:
-    """Draw a sentence, wrapped to the width of the sidebar or of a dialog.
+    """Draw a sentence, wrapped to the width of the sidebar.
 
     Parameters
     ----------
     reserved : float, pixels at the usual scale of the interface
         Width that a button in the same row takes.
-    width : float, pixels at the usual scale of the interface, optional
-        Width of the dialog that is drawn; by default that of the region.
     """
+    draw_lines(layout, wrapped(text, MARGIN + reserved + (ICON if icon != "NONE" else 0.0)), icon, alert=alert)
+
+
+def draw_lines(layout: bpy.types.UILayout, lines: list[str], icon: str = "NONE", *, alert: bool = False) -> None:
+    """Draw the lines of a text, with an icon before the first."""
     column = layout.column(align=True)
     column.alert = alert
     column.scale_y = 0.8
     rest = "NONE" if icon == "NONE" else "BLANK1"
-    for number, line in enumerate(wrapped(text, MARGIN + reserved + (ICON if icon != "NONE" else 0.0), width)):
+    for number, line in enumerate(lines):
         column.label(text=line, icon=icon if number == 0 else rest, translate=False)
 
 
@@ -56,18 +58,33 @@ def wrapped(text: str, taken: float, width: float | None = None) -> list[str]:
     width : float, pixels at the usual scale of the interface, optional
         Width in place of that of the region.
     """
-    context = bpy.context
-    scale = _scale()
-    if width is None:
-        width = context.region.width / scale if context.region is not None else DEFAULT_WIDTH
+    room = (sidebar_width() if width is None else width) - taken
     lines: list[str] = []
     for word in text.split():
         longer = f"{lines[-1]} {word}" if lines else word
-        if lines and text_width(longer) <= width - taken:
+        if lines and text_width(longer) <= room:
             lines[-1] = longer
         else:
-            lines.append(word)
+            lines += _pieces(word, room)
     return lines
+
+
+def _pieces(word: str, room: float) -> list[str]:
+    """Return a word, such as a path, in pieces that have room in a line each, of one letter at least."""
+    pieces = [word]
+    while text_width(pieces[-1]) > room and len(pieces[-1]) > 1:
+        rest = pieces.pop()
+        most = max((n for n in range(1, len(rest)) if text_width(rest[:n]) <= room), default=1)
+        at_separator = max(rest.rfind(separator, 0, most) for separator in "/\\") + 1
+        cut = at_separator if at_separator > 1 else most
+        pieces += [rest[:cut], rest[cut:]]
+    return pieces
+
+
+def sidebar_width() -> float:
+    """Return the width of the region that is drawn, pixels at the usual scale of the interface."""
+    region = bpy.context.region
+    return DEFAULT_WIDTH if region is None else float(region.width) / _scale()
 
 
 def text_width(text: str) -> float:

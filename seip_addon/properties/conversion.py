@@ -44,6 +44,18 @@ def of_setting(kind: type, field: str, name: str, **more: Any) -> Any:  # noqa: 
     return _KINDS[type(default)](name=name, description=description, **arguments)
 
 
+def path_property(name: str, description: str, *, folder: bool = False, default: str = "") -> Any:  # noqa: ANN401 -- as above
+    """Return the property of a file or folder, which may be relative to the .blend; one with a default is written."""
+    output = {"OUTPUT_PATH"} if default else set()
+    return StringProperty(
+        name=name,
+        description=description,
+        subtype="DIR_PATH" if folder else "FILE_PATH",
+        default=default,
+        options={"PATH_SUPPORTS_BLEND_RELATIVE"} | output,
+    )
+
+
 def absolute(text: str) -> Path:
     """Return a path that may be relative to the .blend."""
     return Path(bpy.path.abspath(text))

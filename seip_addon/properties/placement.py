@@ -11,7 +11,7 @@ from .. import selection
 from ..core.choosing.placement.objective import DEFAULT_COUNT, Objective
 from ..core.choosing.placement.scenarios import Scenarios
 from ..core.sensing.scenarios.pose_errors import MAX_ANGLE_STD, PoseErrors
-from .conversion import as_typed, of_setting
+from .conversion import as_typed, of_setting, path_property
 
 
 class SEIP_PG_position_rule(bpy.types.PropertyGroup):
@@ -60,36 +60,36 @@ class SEIP_PG_goal(bpy.types.PropertyGroup):
     central_weight: FloatProperty(
         name="Weight", description="Weight of targets in weighted regions; others have 1", default=2.0, min=0.001
     )
-    min_distance: of_setting(Objective, "min_distance", "Min. Distance")
+    min_distance: of_setting(Objective, "min_distance", "Least Distance")
     criterion: of_setting(
         Objective,
         "criterion",
-        "Criterion",
+        "Maximise",
         items=(
-            ("auto", "By Sensor", "Returns from road users for products, the road seen for the paper's sensor types"),
+            ("auto", "Automatic", "Returns from road users for products, the road seen for the paper's sensor types"),
             ("road", "Road Seen", "The share of the road that sensors see"),
             ("returns", "Returns", "The expected returns from cars, cyclists and pedestrians"),
         ),
     )
     scenarios: EnumProperty(
-        name="Scenarios",
+        name="Conditions",
         description="Conditions that the placement is optimised for",
         items=(
-            ("nominal", "Nominal", "Poses as planned on the empty road"),
-            ("pose-errors", "Pose Errors", "Random errors of the sensors' poses"),
+            ("nominal", "As Planned", "Sensors exactly where they are planned, on the empty road"),
+            ("pose-errors", "Mounting Errors", "Random errors of the sensors' positions and tilts"),
             ("traffic", "Traffic", "Instants of traffic at which vehicles block the view"),
         ),
     )
     risk: of_setting(
         Objective,
         "risk",
-        "Risk Measure",
+        "Average Over",
         items=(
-            ("auto", "Default", "Worst quarter of pose errors, mean of traffic"),
-            ("none", "Evaluate Only", "Optimise for nominal poses and the empty road, and report the loss"),
-            ("mean", "Mean", "Mean over the scenarios"),
-            ("worst-quarter", "Worst Quarter", "Mean over the worst quarter of the scenarios (CVaR)"),
-            ("worst", "Worst", "The worst of the scenarios"),
+            ("auto", "Automatic", "The worst quarter of mounting errors, all instants of traffic"),
+            ("none", "Evaluate Only", "Optimise for sensors as planned on the empty road, and report the loss"),
+            ("mean", "All Cases", "Mean over all cases"),
+            ("worst-quarter", "Worst Quarter", "Mean over the worst quarter of the cases"),
+            ("worst", "Worst Case", "The worst case only"),
         ),
     )
     position_error: of_setting(PoseErrors, "position", "Position Error", min=0.0)
@@ -104,12 +104,11 @@ class SEIP_PG_goal(bpy.types.PropertyGroup):
             ("mean", "Any Sensor", "Mean over the failures of each sensor"),
         ),
     )
-    runs: StringProperty(
-        name="Runs",
-        description="Folder with two or more runs of traffic (.npz); the last third of the runs is for evaluation. "
+    runs: path_property(
+        "Runs",
+        "Folder with two or more runs of traffic (.npz); the last third of the runs is for evaluation. "
         "Empty for the folder SCENE_traffic beside the file",
-        subtype="DIR_PATH",
-        options={"PATH_SUPPORTS_BLEND_RELATIVE"},
+        folder=True,
     )
     rules: CollectionProperty(type=SEIP_PG_position_rule)
     active_rule: IntProperty(name="Position")

@@ -1,28 +1,126 @@
-"""Properties of a scene: all that the add-on keeps in the file."""
+"""Properties of a scene: results, detection, verification, views, and all others by feature."""
 
 from __future__ import annotations
 
 import bpy
-from bpy.props import CollectionProperty, IntProperty, PointerProperty
+from bpy.props import BoolProperty, CollectionProperty, EnumProperty, IntProperty, PointerProperty, StringProperty
 
+from .. import last_scan, selection
 from ..scene_status import FILE_VERSION
-from .detection import SEIP_PG_detection
+from ..viewport import coverage
+from .conversion import path_property
 from .placement import SEIP_PG_goal
-from .results import SEIP_PG_placement, SEIP_PG_result
-from .sections import SEIP_PG_sections
 from .simulation import SEIP_PG_simulation
 from .site import SEIP_PG_site
 from .survey import SEIP_PG_survey
 from .traffic import SEIP_PG_traffic
-from .verification import SEIP_PG_verification
-from .view import SEIP_PG_view
+
+
+class SEIP_PG_chosen(bpy.types.PropertyGroup):
+    """A sensor of the placement; its name is its label."""
+
+
+class SEIP_PG_placement(bpy.types.PropertyGroup):
+    """A placement: enough to find all about it again from the scene and the visibility kept in the cache."""
+
+    record: StringProperty(name="Record", description="Placement as in placement.json")
+    targets: StringProperty(name="Targets", description="Digest of the placement's targets")
+    seen: StringProperty(name="Seen", description="Number of sensors that see each target, packed")
+
+
+class SEIP_PG_result(SEIP_PG_placement):
+    """The placement that stands in the scene, and what is looked at of it."""
+
+    change: StringProperty(name="Change", description="Difference from the placement before")
+    sensors: CollectionProperty(type=SEIP_PG_chosen)
+    active_sensor: IntProperty(
+        name="Sensor",
+        description="Click to select the sensor in the scene",
+        update=selection.select_sensor,
+    )
+    folder: path_property(
+        "Folder", "Folder for the result; // is the folder of the .blend", folder=True, default="//seip-result/"
+    )
+    render: BoolProperty(
+        name="Include Rendered View",
+        description="Add a rendered view of the scene to the files and the report, which takes a minute",
+        default=False,
+    )
+
+
+class SEIP_PG_detection(bpy.types.PropertyGroup):
+    """Settings of detection, and the latest figures."""
+
+    runs: path_property(
+        "Runs",
+        "Folder with runs of traffic (.npz) to detect road users in, four or more for an interval. "
+        "Empty for the folder SCENE_traffic beside the file",
+        folder=True,
+    )
+    detector: path_property(
+        "Detector", "A trained detector (.pt) of your own; empty for the one that comes with the project"
+    )
+    folder: path_property(
+        "Folder",
+        "Folder for figures, charts and detections; // is the folder of the .blend",
+        folder=True,
+        default="//seip-detection/",
+    )
+    record: StringProperty(name="Record", description="Figures as in detection.json")
+    sensors: StringProperty(name="Sensors", description="Digest of the sensors of the figures")
+
+
+class SEIP_PG_verification(bpy.types.PropertyGroup):
+    """Recording of the installed sensors."""
+
+    recording: path_property(
+        "Recording",
+        "Folder with a folder of sweeps for each sensor, named after it, or a .pcap of an Ouster sensor. "
+        "To choose a folder, open it and press Accept with no file chosen",
+    )
+    found: StringProperty(
+        name="Found", description="Results of the last verification, one sentence a line", options={"HIDDEN"}
+    )
+
+
+def _recolour(_own: object, context: bpy.types.Context) -> None:
+    last_scan.show_cloud(context.scene)
+
+
+def _show_legend(own: bpy.types.PropertyGroup, _context: object) -> None:
+    coverage.update(own.id_data)
+
+
+class SEIP_PG_view(bpy.types.PropertyGroup):
+    """Display settings of the results."""
+
+    legend: BoolProperty(
+        name="Legend",
+        description="Show the legend of the coverage colours, and the sensors' labels",
+        default=True,
+        update=_show_legend,
+    )
+    cloud_colour: EnumProperty(
+        name="Point Colours",
+        description="Meaning of the point cloud's colours",
+        items=(
+            ("sensor", "Sensor", "Which sensor measured the point"),
+            ("intensity", "Intensity", "How strong the return is"),
+            ("instance", "Road User", "Which road user returned it"),
+        ),
+        update=_recolour,
+    )
+    picture: path_property(
+        "Picture",
+        "PNG to write; where one of that name is there already, the next gets a number",
+        default="//placement.png",
+    )
 
 
 class SEIP_PG_scene(bpy.types.PropertyGroup):
     """All that SEIP keeps with a scene."""
 
     version: IntProperty(name="Version", default=FILE_VERSION, options={"HIDDEN"})
-    sections: PointerProperty(type=SEIP_PG_sections)
     site: PointerProperty(type=SEIP_PG_site)
     survey: PointerProperty(type=SEIP_PG_survey)
     goal: PointerProperty(type=SEIP_PG_goal)
@@ -36,9 +134,6 @@ class SEIP_PG_scene(bpy.types.PropertyGroup):
     verification: PointerProperty(type=SEIP_PG_verification)
 
 
-CLASSES = (SEIP_PG_scene,)
-
-
 def attach() -> None:
     """Give every scene its properties."""
     bpy.types.Scene.seip = PointerProperty(type=SEIP_PG_scene)
@@ -47,3 +142,14 @@ def attach() -> None:
 def detach() -> None:
     """Take them away."""
     del bpy.types.Scene.seip
+
+
+CLASSES = (
+    SEIP_PG_chosen,
+    SEIP_PG_placement,
+    SEIP_PG_result,
+    SEIP_PG_detection,
+    SEIP_PG_verification,
+    SEIP_PG_view,
+    SEIP_PG_scene,
+)

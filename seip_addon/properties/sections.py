@@ -1,4 +1,7 @@
-"""Properties of the sidebar: which of its sections are open."""
+"""Properties of the sidebar: which of its sections are open.
+
+They belong to the window manager: undo changes only what belongs to the scene.
+"""
 
 from __future__ import annotations
 
@@ -6,7 +9,7 @@ from collections.abc import Callable
 from typing import Any
 
 import bpy
-from bpy.props import BoolProperty, IntProperty
+from bpy.props import BoolProperty, IntProperty, PointerProperty
 
 from .. import scene_status
 
@@ -20,7 +23,7 @@ def _step(name: str, title: str) -> Any:  # noqa: ANN401 -- what Blender makes o
 
     def is_open(own: SEIP_PG_sections) -> bool:
         state = getattr(own, stored)
-        return bool(state == OPEN or (state == AUTOMATIC and scene_status.current_step(own.id_data) == name))
+        return bool(state == OPEN or (state == AUTOMATIC and scene_status.current_step(bpy.context.scene) == name))
 
     def set_open(own: SEIP_PG_sections, value: bool) -> None:  # noqa: FBT001 -- Blender's signature
         setattr(own, stored, OPEN if value else CLOSED)
@@ -52,9 +55,9 @@ class SEIP_PG_sections(bpy.types.PropertyGroup):
     beams: _section("Beam Preview")
     numbers: _section("Number of Sensors")
     details: _section("Details")
-    objective: _section("Criterion and Scenarios")
+    objective: _section("Objective")
     rules: _section("Weights and Positions")
-    candidates: _section("Candidates and Rays")
+    candidates: _section("Positions, Weather, Price")
     search: _section("Search")
     results: _section("Results")
     view: _section("Coverage and Sight Lines")
@@ -73,3 +76,19 @@ class SEIP_PG_sections(bpy.types.PropertyGroup):
 
 
 CLASSES = (SEIP_PG_sections,)
+
+
+def attach() -> None:
+    """Give the window manager its properties."""
+    bpy.types.WindowManager.seip_sections = PointerProperty(type=SEIP_PG_sections)
+
+
+def detach() -> None:
+    """Remove them."""
+    del bpy.types.WindowManager.seip_sections
+
+
+def forget() -> None:
+    """Close all sections but the current step: another file is opened, which may bring its own state."""
+    if isinstance(bpy.data, bpy.types.BlendData):  # Blender shows nobody the open file while it registers an add-on
+        bpy.context.window_manager.property_unset("seip_sections")

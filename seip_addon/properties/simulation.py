@@ -12,7 +12,7 @@ from ..core.workflows.traffic_simulation import DEFAULT_RUNS, SimulationSettings
 from ..core.world.openstreetmap.site import is_extract
 from ..core.world.traffic_simulation.demand import Demand
 from ..scene import contract
-from .conversion import absolute, as_typed, of_setting
+from .conversion import absolute, as_typed, of_setting, path_property
 from .traffic import EXAMPLE, EXAMPLES
 
 EXAMPLE_MAP = EXAMPLES / "junction.xodr"
@@ -22,13 +22,11 @@ _MOST_SECONDS = 3600.0
 class SEIP_PG_simulation(bpy.types.PropertyGroup):
     """Settings of the simulation of traffic, and what was simulated last."""
 
-    map: StringProperty(
-        name="Map",
-        description="Map of the site, on which SUMO simulates traffic: OpenDRIVE (.xodr) or a network of SUMO "
+    map: path_property(
+        "Map",
+        "Map of the site, on which SUMO simulates traffic: OpenDRIVE (.xodr) or a network of SUMO "
         "(.net.xml), as a file, or a text in this file such as the streets of an extract; "
         f"{EXAMPLE} for that of the example. Empty for the map beside the file",
-        subtype="FILE_PATH",
-        options={"PATH_SUPPORTS_BLEND_RELATIVE"},
     )
     flow: of_setting(Demand, "flow", "Vehicles/h", min=1.0, soft_max=1200.0, step=5000, precision=0)
     pedestrians: of_setting(Demand, "pedestrians", "Pedestrians/h", soft_max=1200.0, step=5000, precision=0)
@@ -44,12 +42,8 @@ class SEIP_PG_simulation(bpy.types.PropertyGroup):
         soft_max=16,
         max=1000,
     )
-    folder: StringProperty(
-        name="Folder",
-        description="Folder for the runs only; // is the folder of the .blend",
-        subtype="DIR_PATH",
-        default="//seip-traffic/",
-        options={"OUTPUT_PATH", "PATH_SUPPORTS_BLEND_RELATIVE"},
+    folder: path_property(
+        "Folder", "Folder for the runs only; // is the folder of the .blend", folder=True, default="//seip-traffic/"
     )
     facts: StringProperty(name="Simulated", description="Summary of the last simulation")
     made_with: StringProperty(name="Made With", description="Settings of the last simulation")

@@ -24,7 +24,7 @@ from ..core.world.streetscape.description import DEFAULT_RADIUS
 from ..core.world.streetscape.site_file import DESCRIPTION_SUFFIX
 from ..preferences import overpass, sumo_folders
 from ..scene import contract, roles
-from .conversion import absolute, as_typed, of_setting
+from .conversion import absolute, as_typed, of_setting, path_property
 
 _FILE = {"subtype": "FILE_PATH", "options": {"PATH_SUPPORTS_BLEND_RELATIVE"}}
 _CODE = {"min": 0, "max": 999_999}
@@ -55,12 +55,7 @@ ROLE_ITEMS = tuple((role.name, role.value.capitalize(), f"{roles.WORDS[role].cap
 class SEIP_PG_site(bpy.types.PropertyGroup):
     """Sources of the site, and the findings of the check."""
 
-    source: StringProperty(
-        name="Map",
-        description="OpenDRIVE map, site description that names one, or extract of OpenStreetMap",
-        subtype="FILE_PATH",
-        options={"PATH_SUPPORTS_BLEND_RELATIVE"},
-    )
+    source: path_property("Map", "OpenDRIVE map, site description that names one, or extract of OpenStreetMap")
     new_site: StringProperty(
         name="New Site",
         description="Position of a place whose streets are downloaded from OpenStreetMap: latitude and longitude in "

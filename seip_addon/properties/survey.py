@@ -60,13 +60,13 @@ class SEIP_PG_survey(bpy.types.PropertyGroup):
         "FROM:TO:STEP; 0 is upright, a negative tilt points up",
         default=_TILTS,
     )
-    grid: of_setting(SurveySettings, "grid_spacing", "Target Spacing", min=0.05, soft_max=10.0, step=10)
-    delta: of_setting(VisibilitySettings, "delta", "Seen Within δ", min=0.01, soft_max=5.0, step=10)
+    grid: of_setting(SurveySettings, "grid_spacing", "Point Spacing", min=0.05, soft_max=10.0, step=10)
+    delta: of_setting(VisibilitySettings, "delta", "Ray Within (δ)", min=0.01, soft_max=5.0, step=10)
     rain: of_setting(Weather, "rain", "Rain (mm/h)", max=500.0, soft_max=50.0)
     fog: BoolProperty(name="Fog", description="Reduced visibility in fog or snow")
     visibility: of_setting(Weather, "visibility", "Visibility", default=200.0, soft_max=2000.0)
     wet_road: of_setting(Weather, "wet_road", "Wet Road")
-    spacing: of_setting(CandidateSettings, "spacing", "Spacing", soft_max=50.0, step=50)
+    spacing: of_setting(CandidateSettings, "spacing", "Post Spacing", soft_max=50.0, step=50)
     allow: of_setting(
         CandidateSettings,
         "allow",
@@ -96,11 +96,12 @@ class SEIP_PG_survey(bpy.types.PropertyGroup):
         default="auto",
     )
     effort: FloatProperty(
-        name="Effort",
+        name="Search Time",
         description=(
-            "Limit of the search in counted work, about a second of one processor core for each unit. The same "
-            "inputs give the same placement on every machine"
+            "Limit of the search: seconds of one processor core, counted as work, so that the same inputs give the "
+            "same placement on every machine"
         ),
+        unit="TIME_ABSOLUTE",
         default=DEFAULT_EFFORT,
         min=0.1,
         soft_max=3600.0,

@@ -12,7 +12,7 @@ from ..core.output.datasets.sample import SPLITS
 from ..core.sensing.scans.simulation import ScanSettings
 from ..core.sensing.traffic.source import TrafficFiles
 from ..core.workflows.recording import RecordingSettings
-from .conversion import absolute, as_typed, of_setting
+from .conversion import absolute, as_typed, of_setting, path_property
 
 EXAMPLE = "Example"
 """In place of a traffic file: the traffic of the example, which is at another path on every machine."""
@@ -24,25 +24,13 @@ EXAMPLE_RUN = EXAMPLES / "junction_traffic" / "run-1.npz"
 class SEIP_PG_traffic(bpy.types.PropertyGroup):
     """Source of the traffic, and settings of its scans."""
 
-    file: StringProperty(
-        name="Traffic",
-        description="Trajectories (.npz) or floating car data of SUMO (.xml, .csv, packed or not); "
+    file: path_property(
+        "Traffic",
+        "Trajectories (.npz) or floating car data of SUMO (.xml, .csv, packed or not); "
         f"{EXAMPLE} for the traffic of the example; empty for objects that are animated in the scene",
-        subtype="FILE_PATH",
-        options={"PATH_SUPPORTS_BLEND_RELATIVE"},
     )
-    routes: StringProperty(
-        name="Routes",
-        description="SUMO file with the vehicle types and their sizes",
-        subtype="FILE_PATH",
-        options={"PATH_SUPPORTS_BLEND_RELATIVE"},
-    )
-    net: StringProperty(
-        name="Network",
-        description="SUMO network (.net.xml) with the offset from the map",
-        subtype="FILE_PATH",
-        options={"PATH_SUPPORTS_BLEND_RELATIVE"},
-    )
+    routes: path_property("Routes", "SUMO file with the vehicle types and their sizes")
+    net: path_property("Network", "SUMO network (.net.xml) with the offset from the map")
     loaded: StringProperty(name="Loaded", description="Content of the file, one fact a line")
     seed: of_setting(ScanSettings, "seed", "Seed")
     noise: BoolProperty(
@@ -73,12 +61,11 @@ class SEIP_PG_traffic(bpy.types.PropertyGroup):
         soft_max=20.0,
         step=100,
     )
-    folder: StringProperty(
-        name="Folder",
-        description="Output folder for frames and datasets; an interrupted run resumes there",
-        subtype="DIR_PATH",
+    folder: path_property(
+        "Folder",
+        "Output folder for frames and datasets; an interrupted run resumes there",
+        folder=True,
         default="//scans",
-        options={"OUTPUT_PATH", "PATH_SUPPORTS_BLEND_RELATIVE"},
     )
     formats: EnumProperty(
         name="Formats",

@@ -60,7 +60,8 @@ def contents_of(scene: bpy.types.Scene) -> SceneContents:
     )
     problems += _without_role(scene, members, surfaces)
     geometry, complaint = _geometry(scene, parts)
-    return SceneContents(surfaces, poles_of(_finite(parts)), geometry, tuple(problems), complaint)
+    built = frozenset(part.source.name for part in parts if part.source.get(contract.SOURCE))
+    return SceneContents(surfaces, poles_of(_finite(parts)), geometry, tuple(problems), complaint, built)
 
 
 def _geometry(scene: bpy.types.Scene, parts: list[Shown]) -> tuple[SceneGeometry | None, str]:

@@ -13,17 +13,20 @@ from ..core.site.scene_geometry import NamedArea
 from . import contract
 
 DECIMALS = 3  # of metres, to which outlines are rounded
-KIND = "crossing"
+KINDS = ("crossing", "track")
 
 
 def places_text(places: Iterable[NamedArea]) -> str:
     """Return places as the text of the scene property `contract.PLACES`: JSON, name, outline (WKT) and kind of each.
 
-    The kind is ``crossing`` for pedestrian crossings and missing for streets.
+    The kind is ``crossing`` for pedestrian crossings, ``track`` for tracks of trams or trains, and missing for streets.
     """
     return json.dumps(
         [
-            [one.name, shapely.to_wkt(one.polygon, rounding_precision=DECIMALS), *([KIND] if one.crossing else [])]
+            [
+                *(one.name, shapely.to_wkt(one.polygon, rounding_precision=DECIMALS)),
+                *(kind for kind in KINDS if getattr(one, kind)),
+            ]
             for one in places
         ]
     )
@@ -40,7 +43,9 @@ def places_of(scene: bpy.types.Scene) -> tuple[NamedArea, ...]:
     text = scene.get(contract.PLACES, "[]")
     try:
         places = [
-            NamedArea(str(name), shapely.make_valid(shapely.from_wkt(outline)), crossing=kind == [KIND])
+            NamedArea(
+                *(str(name), shapely.make_valid(shapely.from_wkt(outline))), **{one: kind == [one] for one in KINDS}
+            )
             for name, outline, *kind in json.loads(text)
         ]
     except (TypeError, ValueError, RecursionError, shapely.errors.ShapelyError) as error:

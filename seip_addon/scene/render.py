@@ -31,7 +31,10 @@ from .interrupts import held_signals
 
 WIDTH, HEIGHT = 1440, 810  # pixels
 SAMPLES, DENOISED_SAMPLES = 12, 2  # without and with a denoiser, for as little noise or less
-AZIMUTH, ELEVATION = math.radians(-115.0), math.radians(52.0)  # of the camera, seen from the region
+AZIMUTHS, ELEVATION = np.radians(-115.0 + 45.0 * np.arange(8)), math.radians(60.0)
+"""Directions of the camera, seen from the region."""
+MOST_POINTS = 400  # places on the road at which the view is checked for obstacles
+EQUAL_VIEW = 0.05  # share of the road by which views that hide less than others are as good as the best
 FIELD_OF_VIEW = math.radians(35.0)  # across the picture
 ROOM = 1.07  # around the region and the sensors
 CLOSE_REACH = 300.0  # metres from the camera of a close-up, as far as anything is shown
@@ -47,31 +50,38 @@ class Shot:
     Parameters
     ----------
     viewpoints : tuple of Viewpoint
-        The first from which something stands in front of the fewest sensors is taken.
+        In order of preference; the first that hides few enough of the points is taken, see `slack`.
     reach : float, metres
         From the camera, as far as anything is shown.
     sensors : (k, 3) float64, metres
         Optical centres; in a close-up that of one sensor, then a point low above its foot.
+    points : (n, 3) float64, metres
+        Points that should be visible.
     size : (int, int), pixels
         Width and height of the picture.
+    slack : float
+        Share of the points that a viewpoint may hide more than the best one.
     """
 
     viewpoints: tuple[Viewpoint, ...]
     reach: float
     sensors: Float
+    points: Float
     size: tuple[int, int]
+    slack: float = 0.0
 
     def as_json(self) -> list[Any]:
         """Return it as a JSON value for `from_json`."""
         views = [[array.tolist() for array in (view.place, view.axes, view.slopes)] for view in self.viewpoints]
-        return [views, self.reach, self.sensors.tolist(), self.size]
+        return [views, self.reach, self.sensors.tolist(), self.points.tolist(), self.size, self.slack]
 
     @classmethod
     def from_json(cls, value: list[Any]) -> Shot:
         """Return what `as_json` wrote down."""
-        views, reach, sensors, (width, height) = value
+        views, reach, sensors, points, (width, height), slack = value
         viewpoints = tuple(Viewpoint(*(np.array(array) for array in view)) for view in views)
-        return cls(viewpoints, reach, np.array(sensors, dtype=np.float64).reshape(-1, 3), (width, height))
+        sensors, points = (np.array(xyz, dtype=np.float64).reshape(-1, 3) for xyz in (sensors, points))
+        return cls(viewpoints, reach, sensors, points, (width, height), slack)
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,9 +149,9 @@ def take(shots: Sequence[Shot], scene: bpy.types.Scene, raws: Sequence[Path]) ->
         camera = _add_camera(stage)
         _set_up(stage)
         for shot, raw in zip(shots, raws, strict=True):
-            hidden = [_hidden(stage, shot, viewpoint) for viewpoint in shot.viewpoints]
-            number = int(np.argmin([behind.sum() for behind in hidden]))
-            taken.append(Taken(number, hidden[number]))
+            hidden = np.array([_hidden(stage, shot.points, viewpoint).mean() for viewpoint in shot.viewpoints])
+            number = int(np.argmax(hidden <= hidden.min() + shot.slack))
+            taken.append(Taken(number, _hidden(stage, shot.sensors, shot.viewpoints[number])))
             _aim(camera, shot.viewpoints[number], shot.reach)
             stage.render.resolution_x, stage.render.resolution_y = shot.size
             stage.render.filepath = str(raw)
@@ -202,18 +212,19 @@ def shots_of(site: Site, deployment: Deployment) -> list[Shot]:
     slopes = np.array((slope, slope * HEIGHT / WIDTH))
     sensors = np.array([sensor.xyz for sensor in deployment.sensors]).reshape(-1, 3)
     points = np.vstack((site.targets.xyz, sensors))
-    tight = frame(points, AZIMUTH, ELEVATION, slopes / ROOM)
-    reach = 2.0 * float(np.linalg.norm(points - tight.place, axis=1).max())
-    whole = Shot((Viewpoint(tight.place, tight.axes, slopes),), reach, sensors, (WIDTH, HEIGHT))
-    near = [
-        Shot(
-            tuple(viewpoints(site, sensor)),
-            max(reach, CLOSE_REACH),
-            np.vstack((sensor.xyz, sensor.foot + FOOT_ROOM)),
-            TILE,
-        )
-        for sensor in deployment.sensors[:MOST]
-    ]
+    # From the nearest camera position, the region is largest in the picture.
+    tight = sorted(
+        (frame(points, azimuth, ELEVATION, slopes / ROOM) for azimuth in AZIMUTHS),
+        key=lambda view: round(float(np.linalg.norm(view.place - points.mean(axis=0))), 3),
+    )
+    reach = 2.0 * max(float(np.linalg.norm(points - view.place, axis=1).max()) for view in tight)
+    around = tuple(Viewpoint(view.place, view.axes, slopes) for view in tight)
+    road = site.targets.xyz[:: math.ceil(len(site.targets) / MOST_POINTS)]
+    whole = Shot(around, reach, sensors, road, (WIDTH, HEIGHT), EQUAL_VIEW)
+    near = []
+    for sensor in deployment.sensors[:MOST]:
+        marked = np.vstack((sensor.xyz, sensor.foot + FOOT_ROOM))
+        near.append(Shot(tuple(viewpoints(site, sensor)), max(reach, CLOSE_REACH), marked, marked, TILE))
     return [whole, *near]
 
 
@@ -227,7 +238,7 @@ def labelled_pictures(
 ) -> RenderedPictures:
     """Return rendered pictures with the places of sensors on them."""
     whole, *near = shots
-    (view,) = whole.viewpoints
+    view = whole.viewpoints[taken[0].viewpoint]
     sight = Sight(view.project(whole.sensors), taken[0].hidden, view.project(site.targets.xyz))
     places, images = {}, []
     for shot, how, raw, sensor in zip(near, taken[1:], raws[1:], deployment.sensors, strict=False):
@@ -286,12 +297,12 @@ def sample_count() -> int:
     return min(SAMPLES, DENOISED_SAMPLES) if has_denoiser() else SAMPLES
 
 
-def _hidden(stage: bpy.types.Scene, shot: Shot, viewpoint: Viewpoint) -> Boolean:
-    """Return which sensors of a shot something stands in front of, seen from a viewpoint, (k,) bool."""
+def _hidden(stage: bpy.types.Scene, points: Float, viewpoint: Viewpoint) -> Boolean:
+    """Return which points (n, 3) something stands in front of, seen from a viewpoint, (n,) bool."""
     layer = stage.view_layers[0]
     layer.update()
     start = Vector(viewpoint.place)
-    ways = [Vector(sensor) - start for sensor in shot.sensors]
+    ways = [Vector(point) - start for point in points]
     hits = [
         stage.ray_cast(layer.depsgraph, start, way.normalized(), distance=way.length - SENSOR_ROOM)[0] for way in ways
     ]

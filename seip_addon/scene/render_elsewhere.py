@@ -26,7 +26,7 @@ SAMPLE = re.compile(r"Sample (\d+)/")
 def render_elsewhere(
     folder: Path, blend: Path, scene: str, site: Site, deployment: Deployment
 ) -> Generator[Progress, None, RenderedPictures]:
-    """Render a scene from an oblique angle in the south, and close to each sensor, in a Blender of its own.
+    """Render a scene from the side that hides least of the road, and close to each sensor, in a Blender of its own.
 
     The program that asks goes on answering, and Ctrl-C ends it at once; Blender's own rendering lets neither happen.
 

@@ -21,26 +21,17 @@ AREAS = (
 SHOWN_BY = {"MATERIAL", "VERTEX"}  # ways to colour Solid shading that show the coverage
 
 
-def coverage_overlay() -> Overlay:
-    """Return the legend of the coverage's colours, and the sensors' labels; the mesh is Blender's to draw."""
-    return Overlay((), legend_of_coverage, labels=labels_of_sensors)
-
-
-def show(scene: bpy.types.Scene) -> None:
-    """Show the legend of a scene's coverage, from now on and when the file is opened again."""
-    scene.seip.view.legend = True
-    overlays.show(scene, NAME, coverage_overlay())
-
-
-def hide(scene: bpy.types.Scene) -> None:
-    """Show no legend."""
-    scene.seip.view.legend = False
-    overlays.hide(scene, NAME)
+def update(scene: bpy.types.Scene) -> None:
+    """Show the legend where the scene wants one and has coverage, otherwise none."""
+    if scene.seip.view.legend and coverage_of(scene) is not None:
+        overlays.show(scene, NAME, Overlay((), legend_of_coverage, labels=labels_of_sensors))
+    else:
+        overlays.hide(scene, NAME)
 
 
 def show_colours(scene: bpy.types.Scene) -> None:
     """Show a scene's coverage with its legend, in all views of Solid shading."""
-    show(scene)
+    scene.seip.view.legend = True
     areas = (area for one in bpy.context.window_manager.windows if one.scene == scene for area in one.screen.areas)
     for view in (area.spaces.active for area in areas if area.type == "VIEW_3D"):
         if view.shading.type == "SOLID" and not shows_coverage(view):
@@ -83,8 +74,7 @@ def set_shading(space: bpy.types.SpaceView3D) -> None:
 def _after_load(*_: object) -> None:
     """Show what was shown when the file was saved."""
     for scene in bpy.data.scenes:
-        if scene.seip.view.legend and coverage_of(scene) is not None:
-            overlays.show(scene, NAME, coverage_overlay())
+        update(scene)
 
 
 def attach() -> None:

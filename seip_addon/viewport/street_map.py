@@ -1,4 +1,4 @@
-"""Map of an extract in a viewport, on which a junction is chosen by mouse."""
+"""Map of streets in a viewport, on which a junction is chosen by mouse."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ class StreetMap:
     Parameters
     ----------
     places : SitePlaces
-        Junctions of an extract with their plan.
+        Junctions with their plan.
     frame : (left, bottom, right, top), pixels
         Free part of the viewport.
     scale : float
@@ -65,8 +65,6 @@ class StreetMap:
     """
 
     def __init__(self, places: SitePlaces, frame: Box, scale: float) -> None:
-        if places.plan is None:
-            raise ValueError("the places have no plan")
         self.plan = places.plan
         self.names = [one.name for one in places.places]
         self.scale = scale
@@ -263,7 +261,8 @@ class StreetMap:
     def _credit(self, frame: Box) -> list[str]:
         """Return the lines of the data's credit at the bottom of a frame."""
         blf.size(FONT, TEXT_SIZE * self.scale)
-        return wrapped(self.plan.attribution.split(" "), " ", frame[2] - frame[0] - 2 * PAD * self.scale)
+        words = self.plan.attribution.split()
+        return [] if not words else wrapped(words, " ", frame[2] - frame[0] - 2 * PAD * self.scale)
 
     def _within(self, frame: Box) -> Box:
         """Return the part of a frame between help and credit."""
@@ -280,6 +279,8 @@ class StreetMap:
         for number, words in enumerate(lines, start=1):
             write(words, left + pad, top - line * (number - 0.1), self.scale)
         lines = self._credit(frame)
+        if not lines:
+            return
         wide = max(width_of(words) for words in lines) + 2 * pad
         fill(right - wide, bottom, wide, line * len(lines), (PAPER, PAPER))
         for number, words in enumerate(reversed(lines)):

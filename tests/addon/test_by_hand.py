@@ -5,19 +5,23 @@ import json
 import math
 from pathlib import Path
 
+from headless import place
+
 import bpy
 import numpy as np
 import pytest
 
-from seip_addon import live_coverage
+from seip_addon import live_coverage, scene_status
 from seip_addon.core.choosing.placement.objective import MOVED, MOVED_MESSAGE
 from seip_addon.core.output.results.comparison import unpacked_counts
 from seip_addon.core.output.results.placement_file import comparable, load_placement, parsed_record
+from seip_addon.panels import placement, results, sensors
 from seip_addon.scene import result_folder
 from seip_addon.scene.result_folder import FILES
 from seip_addon.scene.sensors import placed_sensors
 from seip_addon.sensor_edits import sensor_edits
 from seip_addon.session import session
+from tests.builders.drawn_layout import DrawnLayout
 from tests.oracles.json_schema import violations
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -54,10 +58,35 @@ def full_scan(scene: bpy.types.Scene) -> np.ndarray:
     return seen
 
 
+def test_a_file_of_a_command_opens_with_its_sensors_which_are_evaluated_there(
+    add_on, small_scene, tmp_path, monkeypatch
+):
+    options = ["--heights", "8", "--grid", "4", "--spacing", "12", "--count", "2", "--sensor", "type1", "--no-render"]
+    place.main([str(small_scene), *options, "-o", str(tmp_path)])
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "placed.blend"))
+    scene = bpy.context.scene
+    assert placement.status(scene).result == ("2 sensors", "not evaluated")
+    assert scene_status.current_step(scene) == "placement"
+    assert sensors.status(scene).result[0] == "Type 1 (16 channels)"
+    bpy.context.window_manager.seip_sections.view = True
+    monkeypatch.setattr(results.coverage, "shows_coverage", lambda _: True)  # there is no 3D view
+    layout = DrawnLayout()
+    results.draw(layout, bpy.context)
+    assert "seip.colour_coverage" in dict(layout.operators)
+    scene.seip.survey.heights, scene.seip.survey.grid, scene.seip.survey.spacing = "8", 4.0, 12.0
+    assert bpy.ops.seip.evaluate_sensors() == {"FINISHED"}
+    evaluated = parsed_record(scene.seip.result.record)
+    assert evaluated.coverage == load_placement(tmp_path / "placement.json").coverage
+    assert placement.status(scene).changed is False
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "evaluated.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "evaluated.blend"))
+    assert placement.status(bpy.context.scene).changed is False
+
+
 def test_moved_sensors_are_neither_exported_nor_kept_as_what_they_were(placed):
     move(placed)
     for operator in (bpy.ops.seip.export_result, bpy.ops.seip.keep_placement):
-        with pytest.raises(RuntimeError, match=r"By hand: S1 moved; S3 deleted\. Press Evaluate Moved Sensors"):
+        with pytest.raises(RuntimeError, match=r"By hand: S1 moved; S3 deleted\. Press Evaluate Sensors"):
             operator()
 
 
@@ -125,7 +154,7 @@ def test_an_evaluated_deployment_is_kept_compared_and_exported(placed, tmp_path)
     assert comparable(load_placement(out / "placement.json")) == comparable(written)
     again = list(csv.DictReader((out / "candidates.csv").read_text(encoding="utf-8").splitlines()))
     assert again == rows
-    assert session.state_of(scene).solution.certificate == MOVED_MESSAGE
+    assert session.of(scene).state.solution.certificate == MOVED_MESSAGE
 
 
 def test_an_export_that_fails_or_is_stopped_leaves_the_earlier_one_whole(placed, tmp_path, monkeypatch):

@@ -17,7 +17,7 @@ from seip_addon import preferences
 from seip_addon.background import Background
 from seip_addon.core.workflows.detection import DetectingPython
 from seip_addon.operators.detection import SEIP_OT_detect
-from seip_addon.panels import detection as detection_panel
+from seip_addon.panels import traffic as traffic_panel
 from seip_addon.scene.write import write_result
 from tests.builders.small_junction import make_example
 
@@ -74,8 +74,8 @@ def drawn(monkeypatch):
     """Return the sentences, labels and operators of the panel."""
     said, layout = [], MagicMock()
     labels = layout.box().column().column().split().label
-    monkeypatch.setattr(detection_panel, "draw_sentence", lambda _, text, **__: said.append(text))
-    detection_panel.draw(layout, bpy.context)
+    monkeypatch.setattr(traffic_panel, "draw_sentence", lambda _, text, **__: said.append(text))
+    traffic_panel.draw_detection(layout, bpy.context)
     return said, [call.kwargs["text"] for call in labels.call_args_list]
 
 
@@ -86,7 +86,7 @@ def files(folder):
 def test_without_torch_one_sentence_says_what_to_install_and_where(placed, monkeypatch):
     monkeypatch.setattr(preferences, "find_spec", lambda _: None)
     assert preferences.detecting_python() is None
-    sentence = r"needs a Python with PyTorch: .*pip install '\.\[detection\]'.*in the extension's preferences\."
+    sentence = r"PyTorch, named in the extension's preferences: .*pip install 'FILE\.zip\[detection\]'.* checkout\."
     with pytest.raises(RuntimeError, match=sentence):
         bpy.ops.seip.detect()
     with pytest.raises(RuntimeError, match=sentence):
@@ -107,7 +107,7 @@ def test_the_figures_stand_in_the_panel_and_the_files_in_the_folder(placed, stan
         "Cars, vans": "80.0%",
         "Pedestrians": "25.0%",
     }
-    assert said == [detection_panel.MEANING, "it was trained on other types"]
+    assert said == [traffic_panel.MEANING, "it was trained on other types"]
 
 
 def test_the_command_is_given_what_the_panel_shows(placed, stand_in, small_scene, tmp_path):
@@ -127,11 +127,11 @@ def test_sensors_that_were_changed_make_the_figures_old(placed, stand_in, monkey
     bpy.ops.seip.detect()
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "kept.blend"))
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "kept.blend"))
-    assert detection_panel.CHANGED not in drawn(monkeypatch)[0]
+    assert traffic_panel.OTHER_SENSORS not in drawn(monkeypatch)[0]
     sensor = next(obj for obj in bpy.data.collections["SEIP Sensors"].objects if "seip_sensor" in obj)
     sensor.rotation_euler.z += 0.1
     bpy.context.view_layer.update()
-    assert detection_panel.CHANGED in drawn(monkeypatch)[0]
+    assert traffic_panel.OTHER_SENSORS in drawn(monkeypatch)[0]
 
 
 def no_sensors(scene, folder):

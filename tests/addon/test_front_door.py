@@ -12,7 +12,8 @@ import pytest
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from seip_addon import loose_pieces, scene_status
-from seip_addon.panels import detection, export, front_door, results, view
+from seip_addon.operators.base import LongWork
+from seip_addon.panels import export, front_door, results, sections, traffic, wrapped_text
 from seip_addon.scene import contract
 from seip_addon.scene.read import read_scene
 from seip_addon.scene.sensors import placed_sensors
@@ -136,28 +137,78 @@ def test_the_post_of_a_deleted_sensor_goes_with_it(scene, copied):
 
 
 def test_a_section_has_one_sentence_where_there_is_nothing_yet(scene, monkeypatch):
-    for part in (results, export, view, detection):
+    parts = (
+        (results, results.draw),
+        (export, export.draw),
+        (results, results.draw_view),
+        (traffic, traffic.draw_detection),
+    )
+    for part, draw in parts:
         said = []
         monkeypatch.setattr(part, "draw_sentence", lambda _, text, said=said, **__: said.append(text))
         layout = DrawnLayout()
-        part.draw(layout, bpy.context)
+        draw(layout, bpy.context)
         assert len(said) == 1
         assert not layout.operators
 
 
+def headers(monkeypatch, width, status, *, running):
+    """Return what the closed header of the placement shows in a sidebar of a width: texts and icons."""
+    monkeypatch.setattr(sections, "session", SimpleNamespace(running=running and SimpleNamespace(operator=running)))
+    region = SimpleNamespace(width=width)
+    context = SimpleNamespace(region=region, **{n: getattr(bpy.context, n) for n in ("window_manager", "preferences")})
+    monkeypatch.setattr(sections, "bpy", SimpleNamespace(context=context))
+    bpy.context.window_manager.seip_sections.placement = False
+    layout = DrawnLayout()
+    sections.draw_sections(layout, {"placement": None}, None, {"placement": status})
+    return layout.labels[1:]
+
+
+def test_a_closed_header_shows_change_and_work_at_every_width_and_no_result_is_cut(scene, monkeypatch):
+    long = sections.Status(changed=True, result=("94%", "$48k", "within 12.3%"))
+    work = "seip.solve_placement"
+    assert headers(monkeypatch, 500, long, running=work) == [("changed · working · 94% · $48k · within 12.3%", "NONE")]
+    assert headers(monkeypatch, 320, long, running=work) == [("changed · working · 94%", "NONE")]
+    assert headers(monkeypatch, 500, long, running="seip.detect")[0][0].startswith("changed · 94%")
+    for width in range(120, 280, 10):
+        shown = headers(monkeypatch, width, long, running=work)
+        assert shown in ([("changed · working", "NONE")], [("", "ERROR"), ("", "TIME")])
+        free = sections.Status(result=("no room for a result as long as this one", "3"))
+        assert headers(monkeypatch, width, free, running=None) in ([], [("3", "NONE")])
+
+
+def test_the_header_of_some_section_shows_the_work_of_each_operator(scene):
+    def kinds(kind):
+        return {one for below in kind.__subclasses__() for one in (below, *kinds(below))}
+
+    long = {kind.bl_idname.partition(".")[2] for kind in kinds(LongWork) if hasattr(kind, "bl_idname")}
+    assert set().union(*sections.WORK.values()) == long
+
+
+@pytest.mark.parametrize("width", [90.0, 160.0, 420.0])
+def test_no_line_is_wider_than_its_room_and_no_letter_of_a_path_is_lost(scene, width):
+    text = "written to /home/somebody/a/very/long/path_that_has_no_blank/and-goes-on/result/placement.json at once"
+    lines = wrapped_text.wrapped(text, 30.0, width)
+    assert max(map(wrapped_text.text_width, lines)) <= width - 30.0
+    assert "".join(lines).replace(" ", "") == text.replace(" ", "")
+
+
 def test_all_sections_open_without_and_with_a_placement(junction, monkeypatch):
-    for name in [one.identifier for one in junction.seip.sections.bl_rna.properties]:
+    for name in [one.identifier for one in bpy.context.window_manager.seip_sections.bl_rna.properties]:
         if not name.endswith("_state") and name not in {"rna_type", "name"}:
-            setattr(junction.seip.sections, name, True)
-    monkeypatch.setattr(view.coverage, "shows_coverage", lambda _: True)  # there is no 3D view
+            setattr(bpy.context.window_manager.seip_sections, name, True)
+    monkeypatch.setattr(results.coverage, "shows_coverage", lambda _: True)  # there is no 3D view
     panel = SimpleNamespace(layout=DrawnLayout())
     bpy.types.SEIP_PT_steps.draw(panel, bpy.context)
     bpy.ops.seip.solve_placement()
     bpy.ops.seip.keep_placement(name="kept")
     for name in ("site", "sensors", "placement"):
-        setattr(junction.seip.sections, name, True)
+        setattr(bpy.context.window_manager.seip_sections, name, True)
     panel.layout = DrawnLayout()
     bpy.types.SEIP_PT_steps.draw(panel, bpy.context)
     drawn = {name for name, _ in panel.layout.operators}
     assert {"seip.check_site", "seip.choose_sensors", "seip.solve_placement"} <= drawn
     assert {"seip.write_report", "seip.save_picture", "seip.show_comparison"} <= drawn
+    menu = {f"seip.{name}" for step in front_door.STEPS for name in step}
+    own = {name.partition(".")[2] for name in drawn | menu if name.startswith("seip.")}
+    assert all(hasattr(bpy.types, f"SEIP_OT_{name}") for name in own)

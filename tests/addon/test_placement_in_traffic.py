@@ -39,7 +39,7 @@ def test_panel_and_batch_place_alike_and_what_it_was_chosen_on_stays_with_it(coa
     goal = coarse.seip.goal
     goal.failures = "worst"  # left from other scenarios, and not shown for these
     assert bpy.ops.seip.solve_placement() == {"FINISHED"}
-    certificate, purpose, band = session.state_of(coarse).solution.caption
+    certificate, purpose, band = session.of(coarse).state.solution.caption
     assert band.startswith("over plausible gains")
     assert certificate.endswith("among these candidates to see the road in traffic, on average over 2 instants.")
     assert (certificate[:6], purpose[:17]) == ("Proven", "chosen to see the")
@@ -75,7 +75,7 @@ def test_runs_are_read_in_work_that_can_be_stopped(coarse):
     work = SEIP_OT_solve_placement.prepare(SimpleNamespace(), coarse)
     assert any(progress.what == "reading runs of traffic" for progress in work)
     work.close()
-    assert session.state_of(coarse) is None
+    assert session.of(coarse).state is None
     assert not coarse.seip.result.record
 
 

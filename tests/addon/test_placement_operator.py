@@ -11,7 +11,7 @@ from headless import place
 import bpy
 import pytest
 
-from seip_addon import scene_status
+from seip_addon import scene_status, sensor_types
 from seip_addon.core.choosing.placement.scenarios import DEFAULT_COUNTS
 from seip_addon.core.output.results.placement_file import comparable, load_placement, parsed_record
 from seip_addon.core.progress import Progress, finish
@@ -41,8 +41,9 @@ def test_panel_and_batch_write_the_same_placement(junction, tmp_path, small_scen
     assert "With fewer or more sensors under the same rules" in (tmp_path / "panel" / "report.html").read_text(
         encoding="utf-8"
     )
-    key = session.state_of(junction).survey.grid.key
-    assert offered() == [str(tmp_path / "panel" / "report.html"), str(tmp_path / "panel")]
+    key = session.of(junction).state.survey.grid.key
+    written = tmp_path / "panel"
+    assert offered() == [str(path) for path in (written / "plan.png", written / "report.html", written)]
     junction.seip.goal.count = 1
     bpy.ops.seip.solve_placement()
     assert offered() == []  # the files are not of this placement
@@ -74,7 +75,7 @@ def test_a_click_on_a_number_of_sensors_makes_it_the_goal(junction):
     record = parsed_record(junction.seip.result.record)
     assert [point.count for point in record.front] == [1, 2, 3, 4]
     assert choices(junction)[1] == []  # closed
-    junction.seip.sections.numbers = True
+    bpy.context.window_manager.seip_sections.numbers = True
     layout, numbers = choices(junction)
     assert numbers == [(1, False, False), (2, True, True), (3, False, False), (4, False, False)]
     assert layout.bars == [(point.coverage, f"{point.coverage:.1%} · ${point.price:,.0f}") for point in record.front]
@@ -105,7 +106,7 @@ def test_another_goal_makes_placing_the_next_step(junction, monkeypatch):
         assert scene_status.next_step(junction) == scene_status.other_goal(junction) == ""
         setattr(goal, name, value)
         assert scene_status.next_step(junction) == "seip.solve_placement"
-        assert placement_panel.status(junction).endswith("changed")
+        assert placement_panel.status(junction).changed
         assert any("goal has changed" in text for text in sentences(junction, monkeypatch))
         setattr(goal, name, before)
     assert scene_status.next_step(junction) == scene_status.other_goal(junction) == ""
@@ -127,13 +128,13 @@ def test_work_that_is_stopped_at_its_end_leaves_no_trace(junction):
     bpy.ops.seip.solve_placement()
     junction.seip.goal.count = 3
     junction.seip.survey.effort = 30.0
-    before = session.state_of(junction)
+    before = session.of(junction).state
     seen = dict(vars(before))
     placed = finish(work_of("SEIP_OT_solve_placement", junction))
     assert len(placed.solution.deployment.sensors) == 3
     for name in ("compute_visibility", "follow_sensors", "save_picture"):
         finish(work_of(f"SEIP_OT_{name}", junction))
-        assert session.state_of(junction) is before
+        assert session.of(junction).state is before
         assert vars(before) == seen
 
 
@@ -144,7 +145,7 @@ def test_a_saved_placement_goes_on_without_computing(junction, tmp_path, monkeyp
     bpy.ops.wm.save_as_mainfile(filepath=str(path))
     bpy.ops.wm.open_mainfile(filepath=str(path))
     scene = bpy.context.scene
-    assert session.state_of(scene) is None
+    assert session.of(scene).state is None
     assert scene.seip.result.record == before
     for forbidden in ("compute_visibility", "optimise"):
         monkeypatch.setattr(f"seip_addon.core.sensing.visibility.store.{forbidden}", None, raising=False)
@@ -168,7 +169,7 @@ def test_undo_brings_the_earlier_placement_back_and_redo_the_new(junction):
     assert labels(scene) == ["S1", "S2"]
     assert len(json.loads(scene.seip.result.record)["sensors"]) == 2
     bpy.ops.seip.follow_sensors()
-    assert len(session.state_of(scene).solution.deployment.sensors) == 2
+    assert len(session.of(scene).state.solution.deployment.sensors) == 2
     bpy.ops.ed.redo()
     assert labels(bpy.context.scene) == ["S1", "S2", "S3"]
 
@@ -186,8 +187,9 @@ def test_rules_come_from_what_is_selected_and_hold(junction):
     assert [(one.name, one.rule) for one in junction.seip.goal.rules] == [(position, "MANDATORY")]
     bpy.ops.seip.solve_placement()
     assert position in {obj["seip_position"] for obj in placed_sensors(junction).values()}
-    assert bpy.ops.seip.remove_rule() == {"FINISHED"}
-    assert not bpy.ops.seip.remove_rule.poll()
+    assert bpy.ops.seip.remove_entry(of="RULES") == {"FINISHED"}
+    assert not junction.seip.goal.rules
+    assert bpy.ops.seip.remove_entry(of="RULES") == {"CANCELLED"}
 
 
 def test_a_file_of_a_newer_version_is_refused(junction, tmp_path):
@@ -209,7 +211,7 @@ def test_panel_and_batch_place_alike_over_pose_errors(junction, tmp_path, small_
     goal.position_error, goal.tilt_error = 0.5, math.radians(3)
     types = junction.seip.survey
     types.grid, types.spacing = 8.0, 25.0
-    bpy.ops.seip.list_sensor_types()
+    sensor_types.refresh()
     for one in types.types:
         one.use = one.name == "type1"
     assert bpy.ops.seip.solve_placement() == {"FINISHED"}

@@ -49,7 +49,7 @@ def test_two_placements_are_compared_target_by_target(placed):
         f"seen only by the present  {np.mean(after & ~before):.1%}",
         f"seen only by the kept  {np.mean(before & ~after):.1%}",
     ]
-    placed.seip.sections.comparison = True
+    bpy.context.window_manager.seip_sections.comparison = True
     layout = DrawnLayout()
     results_panel.draw(layout, bpy.context)
     assert f"Seen only by the kept {np.mean(before & ~after):.2%}" in layout.text
@@ -114,7 +114,7 @@ def test_a_placement_for_returns_is_followed_and_compared_by_returns(junction):
     record = parsed_record(scene.seip.result.record)
     assert record.returns.typical == pytest.approx(now, rel=1e-3)
     assert "returns instead of" in scene.seip.result.change
-    scene.seip.sections.comparison = True
+    bpy.context.window_manager.seip_sections.comparison = True
     layout = DrawnLayout()
     results_panel.draw(layout, bpy.context)
     assert f"Returns {returns_text(before)} {returns_text(now)}" in layout.text

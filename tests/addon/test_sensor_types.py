@@ -103,17 +103,18 @@ def _made(path):
 
 def test_a_sensor_is_dropped_and_shown(survey):
     survey.types["vlp16"].use = True
-    assert bpy.ops.seip.drop_sensor_type(key=DEFAULT_TYPE) == {"FINISHED"}
-    assert used(survey) == ("vlp16",)
-    with pytest.raises(RuntimeError, match="no sensor type 'none'"):
-        bpy.ops.seip.drop_sensor_type(key="none")
-    assert bpy.ops.seip.about_sensor(key="vlp16") == {"FINISHED"}
-    assert bpy.context.scene.seip.sections.about_sensor
+    sections = bpy.context.window_manager.seip_sections
+    sections.sensors = sections.about_sensor = True
     layout = DrawnLayout()
-    bpy.context.scene.seip.sections.sensors = True
     sensors.draw(layout, bpy.context)
-    assert "Velodyne VLP-16 (Puck)" in layout.text
-    assert sensors.status(bpy.context.scene) == "VLP-16 (Puck) at 3.5–8 m"
+    assert [options["icon"] for name, options in layout.properties if name == "use"] == ["X", "X"]
+    survey.types[DEFAULT_TYPE].use = False  # as a click on its cross does
+    assert used(survey) == ("vlp16",)
+    survey.about = "vlp16"
+    layout = DrawnLayout()
+    sensors.draw(layout, bpy.context)
+    assert layout.text.count("Velodyne VLP-16 (Puck)") == 2  # the product, and its figures
+    assert sensors.status(bpy.context.scene).result == ("VLP-16 (Puck)", "at 3.5–8 m")
 
 
 def test_the_cache_is_emptied_of_grids_alone(survey):

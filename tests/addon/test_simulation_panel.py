@@ -11,7 +11,7 @@ import bpy
 import pytest
 
 from seip_addon.operators.simulation import SEIP_OT_simulate_traffic
-from seip_addon.panels import simulation as simulation_panel
+from seip_addon.panels import traffic as traffic_panel
 from seip_addon.session import session
 from tests.builders.drawn_layout import DrawnLayout
 from tests.builders.osm_text import crossing
@@ -37,27 +37,27 @@ def short(scene):
 
 def drawn():
     layout = DrawnLayout()
-    simulation_panel.draw(layout, bpy.context)
+    traffic_panel.draw_simulation(layout, bpy.context)
     return layout
 
 
 @needs_sumo
 def test_runs_are_those_of_the_command_and_used_by_the_next_buttons(site, tmp_path):
-    assert dict(drawn().properties)["map"] == {"placeholder": "junction.xodr"}
+    assert dict(drawn().properties)["map"]["placeholder"] == "junction.xodr"
     assert bpy.ops.seip.simulate_traffic() == {"FINISHED"}
     scene, seip = site, site.seip
     assert (seip.detection.runs, seip.goal.runs) == ("//seip-traffic/", "//seip-traffic/")
     assert seip.traffic.file == "//seip-traffic/run-1.npz"
-    users = len(session.traffic[scene.session_uid].trajectories)
+    users = len(session.of(scene).traffic.trajectories)
     assert len(bpy.data.collections["SEIP Traffic"].objects) == users
     assert seip.traffic.loaded.startswith(f"{users} road users, 0 to 4.8 s")
     assert bpy.ops.seip.load_traffic() == {"FINISHED"}
     text = drawn().text
     assert "2 runs, " in text
-    assert simulation_panel.USED in text
-    assert simulation_panel.CHANGED not in text
+    assert traffic_panel.USED in text
+    assert traffic_panel.OTHER_SETTINGS not in text
     seip.simulation.flow = 500.0
-    assert simulation_panel.CHANGED in drawn().text
+    assert traffic_panel.OTHER_SETTINGS in drawn().text
     traffic.main([
         str(SCENES / "junction.blend"), "--simulate", str(SCENES / "junction.xodr"), "--flow", "450",
         "--pedestrians", "60", "--duration", "5", "--seed", "2", "-o", str(tmp_path / "2.npz"),

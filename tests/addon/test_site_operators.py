@@ -10,8 +10,10 @@ import pytest
 
 from seip_addon.core.site.installed_cost import load_installed_cost
 from seip_addon.core.world.elevation.at_place import TerrainRequest
+from seip_addon.panels import placement
 from seip_addon.scene import contract
 from seip_addon.scene.read import read_scene
+from tests.builders.drawn_layout import DrawnLayout
 
 SCENES = Path(__file__).resolve().parents[2] / "scenes"
 MAP = SCENES / "junction.xodr"
@@ -77,6 +79,20 @@ def test_a_site_of_the_same_place_is_changed_and_one_of_another_place_is_a_scene
     assert other.seip.site.source == scene.seip.site.source
 
 
+def test_a_site_of_a_map_without_obstacles_says_so_where_sensors_are_placed(scene):
+    choose(scene, radius=20.0)
+    bpy.ops.seip.build_site()
+    bpy.ops.seip.check_site()
+    assert placement.BARE in [one.text for one in scene.seip.site.problems]
+    layout = DrawnLayout()
+    placement.draw(layout, bpy.context)
+    assert placement.BARE in " ".join(layout.text.split())
+    bpy.ops.mesh.primitive_cube_add(size=8.0, location=(6.0, 10.0, 4.0))
+    contract.find(scene, contract.OCCLUDERS).objects.link(bpy.context.object)
+    bpy.ops.seip.check_site()
+    assert placement.BARE not in [one.text for one in scene.seip.site.problems]
+
+
 @pytest.mark.parametrize(
     ("text", "complaint"), [(None, "no such file"), ("<x/>", "is not OpenDRIVE"), ("<x", "broken XML")]
 )
@@ -116,9 +132,9 @@ def test_roles_by_operator(scene):
     bpy.ops.mesh.primitive_plane_add()
     assert bpy.ops.seip.assign_role(role="ROADS") == {"FINISHED"}
     assert bpy.context.object in contract.find(scene, contract.ROADS).objects[:]
-    assert bpy.ops.seip.take_out_of_role(role="ROADS") == {"FINISHED"}
+    assert bpy.ops.seip.assign_role(role="ROADS", remove=True) == {"FINISHED"}
     with pytest.raises(RuntimeError, match="nothing to take out"):
-        bpy.ops.seip.take_out_of_role(role="ROADS")
+        bpy.ops.seip.assign_role(role="ROADS", remove=True)
     bpy.ops.object.select_all(action="DESELECT")
     with pytest.raises(RuntimeError, match="Select objects first"):
         bpy.ops.seip.assign_role(role="ROADS")

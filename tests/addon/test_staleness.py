@@ -5,19 +5,19 @@ from pathlib import Path
 import bpy
 import pytest
 
-from seip_addon import scene_status
+from seip_addon import live_coverage, scene_status, scene_survey
 from seip_addon.session import SceneState, session
 
 
 @pytest.fixture
 def known(junction):
     bpy.ops.seip.compute_visibility()
-    return session.state_of(junction)
+    return session.of(junction).state
 
 
 def read_again(known: SceneState) -> bool:
     bpy.ops.seip.compute_visibility()
-    return session.state_of(bpy.context.scene).layout.geometry is not known.layout.geometry
+    return session.of(bpy.context.scene).state.layout.geometry is not known.layout.geometry
 
 
 def building() -> bpy.types.Object:
@@ -66,7 +66,7 @@ def test_a_scene_that_no_longer_counts_in_metres_is_refused_although_it_was_read
 def test_a_change_is_noticed_at_once_and_read(known):
     for change in (move, reshape, add, modify, hide, delete):
         assert scene_status.stale_survey(bpy.context.scene) == ""
-        known = session.state_of(bpy.context.scene)
+        known = session.of(bpy.context.scene).state
         change()
         bpy.context.view_layer.update()
         assert scene_status.stale_survey(bpy.context.scene) == "The scene has changed since it was computed."
@@ -79,9 +79,47 @@ def test_a_change_that_is_undone_is_noticed(known):
     reshape()
     bpy.ops.ed.undo_push(message="after")
     bpy.ops.seip.compute_visibility()
-    reshaped = session.state_of(bpy.context.scene)
+    reshaped = session.of(bpy.context.scene).state
     bpy.ops.ed.undo()
     assert read_again(reshaped)
+
+
+@pytest.mark.parametrize("change", [move, reshape, modify, hide])
+def test_undo_of_a_change_leaves_no_trace(known, change):
+    sections = bpy.context.window_manager.seip_sections
+    bpy.ops.seip.solve_placement()
+    bpy.ops.seip.follow_sensors()
+    assert bpy.ops.seip.check_site() == {"FINISHED"}
+    scene = bpy.context.scene
+    states = scene_status.stale_placement, scene_status.stale_check
+    bpy.ops.ed.undo_push(message="before")
+    change()
+    bpy.context.view_layer.update()
+    bpy.ops.ed.undo_push(message="after")
+    assert all(state(scene) for state in states)
+    live_coverage.update()
+    assert session.following.problem
+    sections.details = True
+    sections.site = False
+    bpy.ops.ed.undo()
+    for again in (scene_survey.look_again, live_coverage.update):
+        assert bpy.app.timers.is_registered(again)
+        again()
+    assert [state(bpy.context.scene) for state in states] == ["", ""]
+    assert session.following.problem == ""
+    assert (sections.details, sections.site) == (True, False)
+
+
+def test_following_ends_without_an_error_where_undo_brings_back_another_placement(known):
+    bpy.ops.seip.solve_placement()
+    bpy.ops.ed.undo_push(message="two sensors")
+    bpy.context.scene.seip.goal.count = 1
+    bpy.ops.seip.solve_placement()
+    bpy.ops.ed.undo_push(message="one sensor")
+    bpy.ops.seip.follow_sensors()
+    bpy.ops.ed.undo()
+    live_coverage.update()
+    assert session.following is None
 
 
 def select() -> None:

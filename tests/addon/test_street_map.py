@@ -1,5 +1,6 @@
-"""Map of an extract on which a junction is picked: what the mouse does with it, and where it is drawn."""
+"""Map on which a junction is picked: what the mouse does with it, and where it is drawn."""
 
+from pathlib import Path
 from types import SimpleNamespace
 
 import bpy
@@ -11,6 +12,7 @@ from seip_addon.session import session
 from seip_addon.viewport.street_map import StreetMap
 from tests.builders.osm_text import Extract, crossing
 
+SCENES = Path(__file__).resolve().parents[2] / "scenes"
 FRAME = (60.0, 0.0, 860.0, 600.0)
 
 
@@ -25,9 +27,10 @@ def grid(side=12, spacing=40):
     return extract
 
 
-@pytest.fixture
-def places(add_on, tmp_path):
-    return finish(site_places(grid().write(tmp_path / "grid.osm")))
+@pytest.fixture(params=["extract", "map"])
+def places(request, add_on, tmp_path):
+    opendrive = SCENES / "corridor.xodr"
+    return finish(site_places(grid().write(tmp_path / "grid.osm") if request.param == "extract" else opendrive))
 
 
 @pytest.fixture
@@ -56,7 +59,7 @@ def test_another_file_forgets_the_choice_and_the_same_one_keeps_it(add_on, tmp_p
     scene = bpy.context.scene
     path = grid(4).write(tmp_path / "grid.osm")
     bpy.ops.seip.choose_map(filepath=str(path))
-    assert session.places.has_map
+    assert session.places.places
     site = scene.seip.site
     site.junction, site.radius = site.junctions[3].name, 55.0
     bpy.ops.seip.choose_map(filepath=str(path))

@@ -69,7 +69,7 @@ def test_a_scan_at_a_time_of_the_run_is_the_runs_frame(placed, tmp_path):
     bpy.ops.seip.write_dataset()
     placed.frame_set(21 * placed.render.fps)
     bpy.ops.seip.scan_frame()
-    recorded, shown = Frame.load(tmp_path / "run" / "frames" / "000001.npz"), session.scan_of(placed).frame
+    recorded, shown = Frame.load(tmp_path / "run" / "frames" / "000001.npz"), session.of(placed).scan.frame
     assert shown.points.tobytes() == recorded.points.tobytes()
     assert shown.labels.points.tolist() == recorded.labels.points.tolist()
 
@@ -78,11 +78,11 @@ def test_animated_objects_are_scanned_as_the_file_is(placed):
     bpy.ops.seip.load_traffic()
     placed.frame_set(480)
     bpy.ops.seip.scan_frame()
-    from_file = session.scan_of(placed).frame
+    from_file = session.of(placed).scan.frame
     placed.seip.traffic.file = ""
     placed.frame_start, placed.frame_end = 479, 481
     bpy.ops.seip.scan_frame()
-    animated = session.scan_of(placed).frame
+    animated = session.of(placed).scan.frame
     assert len(animated.labels) == len(from_file.labels)
     assert np.allclose(np.sort(animated.labels.centre[:, 0]), np.sort(from_file.labels.centre[:, 0]), atol=0.01)
 

@@ -15,7 +15,7 @@ from seip_addon.core.site.scene_geometry import Mesh
 from seip_addon.core.workflows.verifying import verify
 from seip_addon.operators import verification as operators
 from seip_addon.operators.verification import SEIP_OT_verify
-from seip_addon.panels import verification as panel
+from seip_addon.panels import traffic as panel
 from seip_addon.scene import contract
 from seip_addon.scene.read import read_scene
 from seip_addon.scene.sensors import read_sensors
@@ -91,7 +91,7 @@ def verified(placed, computed, monkeypatch):
 
 def drawn():
     layout = DrawnLayout()
-    panel.draw(layout, bpy.context)
+    panel.draw_verification(layout, bpy.context)
     return layout
 
 
@@ -114,7 +114,7 @@ def test_the_panel_tells_poses_changes_and_coverage(verified, tmp_path):
     assert re.search(rf"S1 by {off:.2f} m and 0\.\d°, S2 by {off:.2f} m", text)
     assert f"1 object is not in the scene (Found 1); 1 object is no longer there ({GONE})." in text
     assert f"{record.coverage.promised:.1%} were promised" in text
-    assert [name for name, _ in drawn().operators] == ["seip.verify", "seip.correct_scene", "seip.show_changes"]
+    assert [name for name, _ in drawn().operators] == ["seip.verify", "seip.correct_scene", "wm.path_open"]
 
 
 @pytest.mark.slow
@@ -148,7 +148,7 @@ def test_stopped_work_leaves_nothing(placed, tmp_path):
         next(steps)
     steps.close()
     assert not (tmp_path / "out").exists()
-    assert placed.session_uid not in session.verifications
+    assert session.of(placed).verification is None
 
 
 class _Stub:
@@ -182,7 +182,7 @@ def test_each_mistake_has_its_sentence(placed, tmp_path, wrong, words):
     with pytest.raises(RuntimeError, match=words):
         bpy.ops.seip.verify()
     assert not (tmp_path / "out").exists()
-    assert placed.session_uid not in session.verifications
+    assert session.of(placed).verification is None
 
 
 def test_a_saved_file_keeps_what_was_found(verified, tmp_path):
@@ -193,7 +193,10 @@ def test_a_saved_file_keeps_what_was_found(verified, tmp_path):
     assert len(found) == 3
     text = drawn().text
     assert all(sentence in text for sentence in (*found, operators.NOT_VERIFIED))
-    assert bpy.ops.seip.show_changes.poll()
+    assert operators.picture_of(bpy.context.scene).is_file()
+    bpy.context.scene.seip.result.folder = ""
+    assert operators.picture_of(bpy.context.scene) is None
+    assert "wm.path_open" not in dict(drawn().operators)
     assert not bpy.ops.seip.correct_scene.poll()
 
 

@@ -38,7 +38,7 @@ def test_coverage_is_coloured_with_a_legend(placed):
 
 
 def test_sight_lines_are_the_row_of_the_grid(placed):
-    held = session.state_of(placed)
+    held = session.of(placed).state
     sensor = held.solution.deployment.sensors[1]
     assert bpy.ops.seip.show_sight_lines(sensor=sensor.label) == {"FINISHED"}
     overlay = overlays.find(placed, SIGHT)
@@ -77,7 +77,7 @@ def test_a_picture_has_the_view_and_the_plan(placed, tmp_path, monkeypatch):
     monkeypatch.setattr(picture, "view_pixels", lambda *_: np.zeros((540, 960, 3), dtype=np.uint8))
     for _ in range(2):
         path = view._free(view._named(str(tmp_path / "report.png")))  # noqa: SLF001  # as the operator names it
-        view.save_viewport_sheet(path, placed, None, session.state_of(placed))
+        view.save_viewport_sheet(path, placed, None, session.of(placed).state)
     assert sorted(path.name for path in tmp_path.glob("*.png")) == ["report-2.png", "report.png"]
     with Image.open(tmp_path / "report.png") as sheet:
         plan = round(DPI * (MAP_WIDTH + 2 * MARGIN))
@@ -95,7 +95,7 @@ def test_a_placement_shows_its_coverage_with_legend_and_labels_and_so_does_the_f
     scene = bpy.context.scene
     assert overlays.legend_blocks(scene) == blocks
     assert overlays.labels_of(scene) == labels
-    bpy.ops.seip.toggle_legend()
+    scene.seip.view.legend = False
     bpy.ops.wm.save_as_mainfile(filepath=str(path))
     bpy.ops.wm.open_mainfile(filepath=str(path))
     assert handler_count() == 0

@@ -17,7 +17,7 @@ from seip_addon.core.progress import Progress
 from seip_addon.operators import base, results
 from seip_addon.panels import missing_package
 from seip_addon.panels import placement as placement_panel
-from seip_addon.panels.run_button import draw_run
+from seip_addon.panels.sidebar import draw_run
 from seip_addon.session import RunningWork, session
 from tests.builders.drawn_layout import DrawnLayout
 
@@ -70,7 +70,7 @@ def test_the_panel_says_what_the_record_holds(placed, monkeypatch):
     assert said[0] == f"{share} of the road is seen. No placement of these candidates is better."
     notes = {sentence(note) for note in record["notes"]}
     assert not notes & set(said)
-    placed.seip.sections.details = True
+    bpy.context.window_manager.seip_sections.details = True
     placement_panel.draw(DrawnLayout(), bpy.context)
     assert notes < set(said)
     assert "Proven by the criterion: the best placement among these candidates." in said

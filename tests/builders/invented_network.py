@@ -9,6 +9,7 @@ import numpy as np
 from seip_addon.core.output.network.network_record import NetworkPoint, NetworkRecord, NetworkSensor, NetworkSite
 
 TYPES = ("os1_128", "vlp32c")
+NAMES = {"os1_128": "OS1-128", "vlp32c": "Product <VLP>"}
 PRICES = (18_000.0, 11_500.0)
 CREATED = "2026-01-02T03:04:05+00:00"
 
@@ -80,6 +81,7 @@ def network_of(sites, *, criterion="road", **changes):
         sites=sites,
         curve=points,
         sensor_types=TYPES,
+        sensor_names=NAMES,
     )
 
 

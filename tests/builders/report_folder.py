@@ -72,7 +72,7 @@ def make_folder(
     problem = placement_problem(example.site, example.visible, example.models, goal)
     if effort:
         whole, own = len(example.site.targets), len(solution.placement.chosen)
-        front = finish(front_of(problem, solution.placement, range(own, own + 1), effort)).items()
+        front = finish(front_of(problem, solution.placement, range(own - 1, own + 1), effort)).items()
         points = (
             FrontPoint(count, one.objective / whole, one.price, (one.bound - one.objective) / whole)
             for count, one in front

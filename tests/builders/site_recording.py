@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from seip_addon.core.output.datasets.pcd import POINT_TYPE, encode
+from seip_addon.core.output.datasets.formats import POINT_TYPE, encode
 from seip_addon.core.progress import finish
 from seip_addon.core.sensing.scans.sensor import MountedSensor
 from seip_addon.core.sensing.scans.simulation import ScanSettings, prepare

@@ -51,7 +51,7 @@ def test_a_report_is_written(folder):
     assert f"${record.price_usd:,.0f} installed (" in page
     assert all(sensor.location in page for sensor in record.sensors)
     assert all("behind the kerb" in sensor.location for sensor in record.sensors)
-    assert "Installed, $" in page
+    assert "Price installed, $" in page
     assert [point.count for point in record.front] == [1, 2, 3, 4]
 
 

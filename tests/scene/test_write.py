@@ -168,3 +168,27 @@ def test_coverage_is_recoloured_from_the_mesh_alone(example, scene):
         assert list(obj["seip_classes"]) == list(expected.words)
         assert np.allclose(obj["seip_shares"], expected.shares)
         assert obj["seip_aspect"] == aspect
+
+
+def test_the_view_is_from_a_side_without_towers(example, scene, tmp_path, monkeypatch):
+    monkeypatch.setattr("seip_addon.scene.render.WIDTH", 48)
+    monkeypatch.setattr("seip_addon.scene.render.HEIGHT", 27)
+    (whole, *_) = shots_of(example.site, example.deployment)
+    middle = example.site.targets.xyz.mean(axis=0)
+    nearest = whole.viewpoints[0].place - middle
+    towards = nearest[:2] / np.hypot(*nearest[:2])
+    # A wall beside the road that the nearest viewpoint would look at from behind.
+    reach = np.abs((example.site.targets.xyz - middle)[:, :2] @ towards).max() + 5.0
+    along = 200.0 * np.array((-towards[1], towards[0]))
+    foot = middle[:2] + reach * towards
+    corners = [(*(foot + side * along), z) for side, z in ((-1, -5.0), (1, -5.0), (1, 150.0), (-1, 150.0))]
+    mesh = bpy.data.meshes.new("Tower")
+    mesh.from_pydata(corners, [], [(0, 1, 2, 3)])
+    raws = raw_files(tmp_path, [whole])
+    with silenced():
+        (open_air,) = take([whole], scene, raws)
+        scene.collection.objects.link(bpy.data.objects.new("Tower", mesh))
+        bpy.context.view_layer.update()
+        (walled,) = take([whole], scene, raws)
+    assert open_air.viewpoint == 0
+    assert (whole.viewpoints[walled.viewpoint].place - middle)[:2] @ towards < 0.0

@@ -164,7 +164,7 @@ class Window:
 
     def open_section(self, name: str) -> Steps:
         """Open a section of the sidebar; a header is not a button that the mouse could be asked for."""
-        setattr(self.window.scene.seip.sections, name, True)
+        setattr(bpy.context.window_manager.seip_sections, name, True)
         self.area.tag_redraw()
         yield 0.5
 

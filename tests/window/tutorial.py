@@ -96,11 +96,11 @@ def _check(window: Window) -> Steps:
     yield from window.open_section("site")
     yield from window.open_section("contents")
     yield from window.picture("2-check")
-    _scene().seip.sections.site = False
+    bpy.context.window_manager.seip_sections.site = False
 
 
 def _choose(window: Window) -> Steps:
-    sections = _scene().seip.sections
+    sections = bpy.context.window_manager.seip_sections
     yield from window.open_section("sensors")
     yield from window.enter("seip.survey.heights", "8")
     yield from window.click("seip.choose_sensors(")
@@ -197,14 +197,14 @@ def _move_by_hand(window: Window) -> Steps:
     yield from window.click("seip.evaluate_sensors(")
     yield from window.until(lambda: session.running is None and _record() != before, 200)
     assert _places() == there
-    assert (yield from _says(window, "Moved by hand"))
+    assert (yield from _says(window, "Evaluated at the sensors' current poses"))
     assert not (yield from _says(window, "Proven"))
 
 
 def _report(window: Window) -> Steps:
     """Export with a report, and see that all files tell of one placement."""
     _scene().seip.result.folder = str(FOLDER)
-    _scene().seip.sections.placement = False
+    bpy.context.window_manager.seip_sections.placement = False
     yield from window.open_section("export")
     yield from window.click("seip.write_report(")
     yield from window.until(lambda: session.running is None and (FOLDER / "report.pdf").exists(), 200)
@@ -217,7 +217,7 @@ def _report(window: Window) -> Steps:
     yield from window.picture("8-report")
     yield from window.click("seip.save_picture(")
     yield from window.until((OUT / "placement.png").exists, 60)
-    _scene().seip.sections.export = False
+    bpy.context.window_manager.seip_sections.export = False
 
 
 def _scan(window: Window) -> Steps:
@@ -236,7 +236,7 @@ def _scan(window: Window) -> Steps:
 def _simulate(window: Window) -> Steps:
     """Simulate traffic, stop that, simulate again, undo it and redo it; where SUMO is missing its button is there."""
     preferences.own().sumo = str(SUMO.resolve()) if SUMO is not None else ""
-    _scene().seip.sections.scan = False
+    bpy.context.window_manager.seip_sections.scan = False
     yield from window.open_section("simulation")
     if preferences.sumo() is None:
         yield from window.find("seip.install_sumo(")
@@ -273,11 +273,14 @@ def _simulate(window: Window) -> Steps:
 
 
 def _import_map(window: Window) -> Steps:
-    """Import a map through its dialog, as a dropped file is, into a scene of its own."""
+    """Import a map, as a dropped file is, through its map and its dialog, into a scene of its own."""
     before = set(bpy.data.scenes)
     with bpy.context.temp_override(window=window.window, area=window.area, region=window.region("WINDOW")):
         bpy.ops.seip.choose_map("INVOKE_DEFAULT", filepath=str(SCENES / "corridor.xodr"))
     yield from window.until(lambda: session.running is None and "corridor" in _scene().seip.site.source, 60)
+    yield 1.0
+    yield from window.shot("12-map")
+    yield from window.press("RET")  # from the map to the list of names
     yield 1.0
     yield from window.shot("12-dialog")
     yield from window.press("RET")
@@ -309,7 +312,7 @@ def _reopen(window: Window) -> Steps:
     yield from window.open_sidebar("SEIP")
     yield from window.press("NUMPAD_0")  # the camera's view
     yield from window.until(lambda: session.running is None and _known() is not None, 30)
-    _scene().seip.sections.details = True
+    bpy.context.window_manager.seip_sections.details = True
     yield from window.open_section("placement")
 
 
@@ -332,7 +335,7 @@ def _record() -> dict[str, Any]:
 
 
 def _known() -> SceneState | None:
-    return session.state_of(_scene())
+    return session.of(_scene()).state
 
 
 def _sensors() -> list[bpy.types.Object]:

@@ -17,6 +17,7 @@ _GEOGRAPHIC_WKT = (
     'AUTHORITY["EPSG","6326"]],PRIMEM["Greenwich",0,AUTHORITY["EPSG","8901"]],'
     'UNIT["degree",0.0174532925199433,AUTHORITY["EPSG","9122"]],AUTHORITY["EPSG","4326"]]'
 )
+_SOUTHERN_NORTHING = 10_000_000.0  # false northing of southern UTM zones, metres
 _NEWTON_STEPS = 5  # two reach full precision away from the poles
 _UTM = re.compile(r"EPSG:+(258|326|327)(\d\d)\b", re.IGNORECASE)
 _WORLD_DATUMS = {"WGS84", "GRS80", "ETRS89"}
@@ -69,14 +70,18 @@ class TransverseMercator:
         return np.arctan(_tangent_of_latitude(conformal)), (longitude + math.pi) % math.tau - math.pi
 
     @property
+    def zone(self) -> str:
+        """The UTM zone with its hemisphere, such as "50S"; "" for other projections."""
+        number = round((math.degrees(self.longitude) + 183) / 6)
+        zones = (f"{number}{'S' if south else 'N'}" for south in (False, True) if self == _utm(number, south=south))
+        return next(zones, "")
+
+    @property
     def wkt(self) -> str:
         """The projected reference system as well-known text 1 (OGC 01-009), as stored in LAS files."""
-        zone = round((math.degrees(self.longitude) + 183) / 6)
         name, authority = "Transverse Mercator", ""
-        for south in (False, True):
-            if self == _utm(zone, south=south):
-                name = f"UTM zone {zone}{'S' if south else 'N'}"
-                authority = f',AUTHORITY["EPSG","{327 if south else 326}{zone:02d}"]'
+        if self.zone:
+            name, authority = f"UTM zone {self.zone}", f',AUTHORITY["EPSG","{_epsg(self.zone)}"]'
         parameters = {
             "latitude_of_origin": round(math.degrees(self.latitude), 12),
             "central_meridian": round(math.degrees(self.longitude), 12),
@@ -140,6 +145,23 @@ class GeoReference:
     def mercator(self) -> TransverseMercator | None:
         """The projection; None if it is not known, or the header rotates the map."""
         return None if self.header_offset[3] else projection(self.projection)
+
+    def in_hemisphere(self, point: Float) -> "GeoReference":
+        """Return the same reference in the UTM zone of the hemisphere where a point of the map (3,) is.
+
+        Maps south of the equator often use northern zones, with negative northings; southern zones add 10,000 km.
+
+        Examples
+        --------
+        >>> perth = GeoReference("+proj=utm +zone=50", (395_000.0, -3_539_000.0, 0.0, 0.0))
+        >>> perth.in_hemisphere(np.array([843.0, 776.0, 0.0]))
+        GeoReference(projection='EPSG:32750', header_offset=(395000.0, 6461000.0, 0.0, 0.0))
+        """
+        zone = "" if self.mercator is None else self.mercator.zone
+        if not zone.endswith("N") or self.projected(point[None])[0, 1] >= 0.0:
+            return self
+        x, y, z, heading = self.header_offset
+        return GeoReference(f"EPSG:{_epsg(f'{zone[:-1]}S')}", (x, y + _SOUTHERN_NORTHING, z, heading))
 
     def projected(self, points: Float) -> Float:
         """Return easting, northing and height (metres) of points (n, 3) in map coordinates without rotation."""
@@ -222,7 +244,13 @@ def projection(geo_reference: str | None) -> TransverseMercator | None:
 def _utm(zone: int, *, south: bool) -> TransverseMercator | None:
     if not 1 <= zone <= 60:
         return None
-    return TransverseMercator(0.0, math.radians(6 * zone - 183), 0.9996, 500_000.0, 10_000_000.0 if south else 0.0)
+    northing = _SOUTHERN_NORTHING if south else 0.0
+    return TransverseMercator(0.0, math.radians(6 * zone - 183), 0.9996, 500_000.0, northing)
+
+
+def _epsg(zone: str) -> int:
+    """Return the EPSG code of a UTM zone on WGS 84, such as 32750 for 50S."""
+    return (32700 if zone.endswith("S") else 32600) + int(zone[:-1])
 
 
 def _parameters(text: str) -> dict[str, str]:

@@ -117,6 +117,8 @@ class SceneContents:
         Problems found while reading.
     complaint : str
         Reason why there is no geometry, or "".
+    built : frozenset of str
+        Names of the objects that the builder of sites made: a user can do nothing about them, and is not warned.
     """
 
     surfaces: tuple[Surface, ...]
@@ -124,6 +126,7 @@ class SceneContents:
     geometry: SceneGeometry | None
     problems: tuple[Problem, ...]
     complaint: str = ""
+    built: frozenset[str] = frozenset()
 
 
 @dataclass(frozen=True)
@@ -174,7 +177,8 @@ def check_site(
     elif not any(problem.severity == "ERROR" for problem in problems):
         problems.append(Problem("ERROR", contents.complaint, _named_in(contents.complaint, contents)))
     yield Progress(STAGES, STAGES, "candidates", counted=False)
-    return SiteCheck(counts, _in_order(problems))
+    of_user = (one for one in problems if one.severity == "ERROR" or one.obj not in contents.built)
+    return SiteCheck(counts, _in_order(of_user))
 
 
 STAGES = 6
@@ -326,16 +330,17 @@ def _without_road(contents: SceneContents, plans: dict[str, BaseGeometry]) -> It
 
 
 def _pole_problems(contents: SceneContents, region: BaseGeometry) -> Iterator[Problem]:
-    poles = contents.poles
-    if not poles:
+    poles = sorted(contents.poles, key=lambda pole: pole.name not in contents.built)  # of two, the user's is named
+    own = [pole.name not in contents.built for pole in poles]
+    if not any(own):
         return
     feet = np.array([pole.base for pole in poles])
     distance = shapely.distance(region, shapely.points(feet[:, :2])) if not region.is_empty else np.zeros(len(feet))
     yield from _named(
         [
             (pole.name, f"The pole {pole.name!r} stands {away:,.0f} m from the region: remove it from the poles.")
-            for pole, away in zip(poles, distance, strict=True)
-            if away > MAX_POLE_DISTANCE
+            for pole, away, is_own in zip(poles, distance, own, strict=True)
+            if is_own and away > MAX_POLE_DISTANCE
         ],
         f"pole stands more than {MAX_POLE_DISTANCE:g} m from the region: remove it from the poles",
         f"poles stand more than {MAX_POLE_DISTANCE:g} m from the region: remove them from the poles",
@@ -348,8 +353,8 @@ def _pole_problems(contents: SceneContents, region: BaseGeometry) -> Iterator[Pr
                 pole.name,
                 f"The foot of the pole {pole.name!r} is {_level(high)} the ground: move it, or its origin, there.",
             )
-            for pole, high in zip(poles, above, strict=True)
-            if abs(high) > MAX_FOOT_OFFSET
+            for pole, high, is_own in zip(poles, above, own, strict=True)
+            if is_own and abs(high) > MAX_FOOT_OFFSET
         ],
         f"pole has its foot more than {MAX_FOOT_OFFSET:g} m above or below the ground: move it or its origin",
         f"poles have their foot more than {MAX_FOOT_OFFSET:g} m above or below the ground: move them or their origins",
@@ -361,7 +366,7 @@ def _pole_problems(contents: SceneContents, region: BaseGeometry) -> Iterator[Pr
         [
             (poles[b].name, f"The poles {poles[a].name!r} and {poles[b].name!r} stand at one place: remove one.")
             for a, b in nearest.T
-            if a < b
+            if a < b and own[b]
         ],
         "pole stands where another one stands: remove one of the two",
         "poles stand where others stand: remove one of each two",

@@ -40,8 +40,7 @@ def without_far_objects(
     geometry : SceneGeometry
         Geometry without distant triangles; the same object if there are none.
     warnings : tuple of str
-        A sentence that names the objects left out, if any. Ground made by the builder that only extends beyond the
-        range is not reported.
+        A sentence that names the objects left out, if any; those that the builder of sites made are not reported.
     """
     if math.isinf(reach):
         return geometry, ()
@@ -58,7 +57,7 @@ def without_far_objects(
         (mesh.name, mesh.triangles[~near])
         for name, meshes in roles.items()
         for mesh, near in zip(meshes, kept[name], strict=True)
-        if not near.all() and not (mesh.source and near.any())
+        if not near.all() and not mesh.source
     ]
     if not far:
         return replace(geometry, **left), ()

@@ -43,7 +43,7 @@ def locations(geometry: SceneGeometry, feet: Float) -> list[str]:
     if roads.is_empty:
         return [""] * len(feet)
     shapely.prepare(roads)
-    streets = [place for place in geometry.places if not place.crossing]
+    streets = [place for place in geometry.places if place.street]
     crossings = [place for place in geometry.places if place.crossing]
     return [", ".join(_parts(foot, roads, streets, crossings)) for foot in feet]
 

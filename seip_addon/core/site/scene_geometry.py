@@ -26,6 +26,8 @@ OTHER_LEVELS = "Roads on other levels"
 FROM_MAP, DESCRIBED, ASSUMED = "map", "site description", "assumed"
 FROM_EXTRACT, FROM_SURVEY = "extract", "survey"
 """Source of an object: the map, the site description, an assumption, OpenStreetMap, a survey."""
+HEIGHTS_FROM = "roads and ground take their heights from "
+"""First words of the assumption that names a file of terrain; the file follows, then a comma."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,14 +115,20 @@ class NamedArea:
     ----------
     weight : float
         Weight of the targets in a weighted region.
-    crossing : bool
-        Whether a place of the map is a pedestrian crossing.
+    crossing, track : bool
+        Whether a place of the map is a pedestrian crossing, or a track of trams or trains beside the streets.
     """
 
     name: str
     polygon: BaseGeometry
     weight: float = 1.0
     crossing: bool = False
+    track: bool = False
+
+    @property
+    def street(self) -> bool:
+        """Whether a place of the map is a street."""
+        return not (self.crossing or self.track)
 
 
 @dataclass(frozen=True, eq=False)

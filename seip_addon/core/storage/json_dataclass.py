@@ -1,5 +1,6 @@
 """Conversion of dataclasses from JSON, with every value checked against its field, and of settings to JSON."""
 
+import json
 import math
 import reprlib
 import sys
@@ -9,7 +10,9 @@ from functools import cache, partial
 from types import NoneType, UnionType
 from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
 
+from ..errors import SeipError
 from ..settings import settings_of
+from .files import parse_json
 
 Value = TypeVar("Value")
 
@@ -53,6 +56,30 @@ def from_json(kind: type[Value], content: object, where: str = "") -> Value:
     """
     read: Value = _read(kind, content, where)
     return read
+
+
+def read_record(kind: type[Value], text: str | bytes, schema: str, name: str, cure: str) -> Value:
+    """Return a dataclass from the text of a JSON object whose ``schema`` is given.
+
+    Parameters
+    ----------
+    name, cure : str
+        What the text is, and what to do if it is damaged, for messages.
+
+    Raises
+    ------
+    SeipError
+        The text is damaged, or has another schema.
+    """
+    try:
+        content = parse_json(text)
+        json.dumps(content, ensure_ascii=False, allow_nan=False).encode()  # refuses what cannot be written again
+        found = content.get("schema") if isinstance(content, dict) else None
+        if found == schema:
+            return from_json(kind, content)
+    except (SeipError, ValueError, RecursionError) as error:
+        raise SeipError(f"{name} is damaged: {error}; {cure}") from error
+    raise SeipError(f"{name} has the schema {found!r}, not {schema!r}: {cure}, with one version of SEIP")
 
 
 def as_json(value: object) -> Any:  # noqa: ANN401 -- values of any kind

@@ -14,7 +14,10 @@ from ..sensing.weather import Weather
 
 RECORD, ERRORS = "detection.json", "errors.png"
 """Files of the result: its figures, and the picture of correct, missed and false detections."""
-INSTALL = "run `make detection` or `pip install '.[detection]'` in a checkout of this project"
+INSTALL = (
+    "download this project's source as a .zip and run `pip install 'FILE.zip[detection]'`, or `make detection` in a "
+    "checkout"
+)
 """Instructions to install PyTorch and this project."""
 
 _LINE = re.compile(r"^(.+): (?:(\d+)% done, )?(?:.+, )?[\d.]+ (?:s|min|h) (left|elapsed)$", re.MULTILINE)

@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..acceptance import Acceptance, until_accepted
-from ..choosing.placement.cheapest import cheapest_for_share
+from ..choosing.placement.cheapest import UNPROVEN_PRICE, cheapest_for_share
 from ..choosing.placement.deployment import Deployment, deploy
 from ..choosing.placement.objective import (
+    ACCEPTED_MESSAGE,
     CHOSEN_FOR,
     MOVED,
     FrontPoint,
@@ -27,7 +28,7 @@ from ..choosing.placement.returns_summary import ReturnsPoint
 from ..choosing.placement.risk import NOMINAL, Risk
 from ..choosing.placement.scenarios import Scenarios
 from ..choosing.placement.search_limits import DEFAULT_LIMITS, SolverLimits
-from ..choosing.placement.solver import front_of, solve, solve_greedy
+from ..choosing.placement.solver import UNPROVEN, front_of, solve, solve_greedy
 from ..choosing.robustness.comparison import Comparison
 from ..choosing.robustness.gain_band import with_gain_band
 from ..choosing.robustness.pose_study import pose_study
@@ -42,8 +43,6 @@ from .traffic_runs import TrafficRuns
 
 DRAWS_OF_KIND = 100
 """Largest number of draws with one kind of pose error only."""
-
-ACCEPTED_MESSAGE = "accepted before the end of the search: running it to its end may find a better placement"
 
 _OVER_INSTANTS = {1.0: "on average over", 0.25: "in the worst quarter of", 0.0: "in the worst of"}
 
@@ -105,7 +104,7 @@ def place(
     deployment = yield from with_gain_band(surroundings(survey), solution.deployment)
     notes = [*solution.placement.notes]
     if acceptance is not None and acceptance.accepted and solution.placement.status != "optimal":
-        notes.append(ACCEPTED_MESSAGE)
+        notes = [ACCEPTED_MESSAGE, *(note for note in notes if note not in {UNPROVEN, UNPROVEN_PRICE})]
     if measure is None and deployment.sensors:
         evaluation = _evaluated(survey, replace(solution, deployment=deployment), runs)
         notes += yield from until_accepted(evaluation, acceptance, [])

@@ -9,10 +9,12 @@ from ..progress import Progress
 from ..world.opendrive.junctions import STREETS, streets_of_junctions
 from ..world.opendrive.lanes import LaneSurface, lane_surfaces
 from ..world.opendrive.read import read_map
+from ..world.opendrive.street_plan import street_plan as plan_of_map
 from ..world.openstreetmap.crossings import Crossing, named_crossings
 from ..world.openstreetmap.extract import read_extract
 from ..world.openstreetmap.site import is_extract
-from ..world.openstreetmap.street_plan import StreetPlan, street_plan
+from ..world.openstreetmap.street_plan import street_plan as plan_of_extract
+from ..world.street_plan import StreetPlan
 from ..world.streetscape.description import DEFAULT_RADIUS
 from ..world.streetscape.site_file import describe_place
 
@@ -45,18 +47,13 @@ class SitePlaces:
         Default radius of a site.
     places : tuple of NamedPlace
         Junctions of the file.
-    plan : StreetPlan or None
-        Streets of an extract in plan, with the junctions in the order of ``places``.
+    plan : StreetPlan
+        Streets in plan, with the junctions in the order of ``places``.
     """
 
     radius: float
     places: tuple[NamedPlace, ...]
-    plan: StreetPlan | None = None
-
-    @property
-    def has_map(self) -> bool:
-        """Whether there is a map on which a junction can be chosen."""
-        return self.plan is not None and len(self.places) > 0
+    plan: StreetPlan
 
 
 def site_places(source: Path) -> Generator[Progress, None, SitePlaces]:
@@ -73,7 +70,7 @@ def site_places(source: Path) -> Generator[Progress, None, SitePlaces]:
         crossings = named_crossings(extract)
         named = distinct_names((one.name for one in crossings), "{} ({})")
         places = tuple(NamedPlace(name, _position(one)) for name, one in zip(named, crossings, strict=True))
-        return SitePlaces(DEFAULT_RADIUS, places, street_plan(extract, crossings))
+        return SitePlaces(DEFAULT_RADIUS, places, plan_of_extract(extract, crossings))
     map_path, description = describe_place(source)
     road_map = read_map(map_path)
     lanes: list[LaneSurface] = []
@@ -84,11 +81,12 @@ def site_places(source: Path) -> Generator[Progress, None, SitePlaces]:
     meeting = streets_of_junctions(road_map, lanes)
     junctions = road_map.junctions_with_roads()
     streets = {one.id: STREETS.join(meeting.get(one.id, ())) for one in junctions}
-    named = [" · ".join(filter(None, (one.id, one.name, streets[one.id]))) for one in junctions]
+    own = {one.id: one.name for one in junctions if one.name.casefold() != f"junction{one.id}"}
+    named = [" · ".join(filter(None, (one.id, own.get(one.id), streets[one.id]))) for one in junctions]
     places = tuple(
         NamedPlace(name, one.id) for name, one in zip(distinct_names(named, "{} ({})"), junctions, strict=True)
     )
-    return SitePlaces(description.radius or DEFAULT_RADIUS, places)
+    return SitePlaces(description.radius or DEFAULT_RADIUS, places, plan_of_map(road_map, lanes, junctions))
 
 
 def _position(crossing: Crossing) -> str:

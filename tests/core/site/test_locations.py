@@ -16,6 +16,7 @@ def road(left, bottom, right, top):
 PLACES = (
     NamedArea("Rope Lane", shapely.box(10, -4, 100, 4)),
     NamedArea("Mill Street", shapely.box(-4, 10, 4, 100)),
+    NamedArea("Tram track", shapely.box(10, 4, 100, 5), track=True),
     NamedArea("Crossing of Rope Lane", shapely.box(12, -4, 16, 4), crossing=True),
 )
 

@@ -9,7 +9,7 @@ from seip_addon.core.geometry.plan import outline
 from seip_addon.core.progress import finish
 from seip_addon.core.site.candidates import CandidateSettings
 from seip_addon.core.site.check import SceneContents, Surface, check_site
-from seip_addon.core.site.scene_geometry import Mesh, SceneGeometry
+from seip_addon.core.site.scene_geometry import Mesh, Pole, SceneGeometry
 from seip_addon.core.site.site import make_site
 
 
@@ -34,13 +34,9 @@ SITE = make_site(GEOMETRY, CandidateSettings(heights=(8.0,), spacing=12.0), 4.0)
 SOUND = SceneContents((ROAD, REGION, PAVEMENT), (), GEOMETRY, ())
 
 
-def checked(*surfaces, poles=(), problems=()):
-    contents = SceneContents(tuple(surfaces), tuple(poles), GEOMETRY, tuple(problems))
-    return finish(check_site(contents, lambda _: (SITE, ())))
-
-
-def found(*surfaces, poles=()):
-    return [(p.severity, p.obj, p.text) for p in checked(*surfaces, poles=poles).problems]
+def found(*surfaces, poles=(), built=()):
+    contents = SceneContents(tuple(surfaces), tuple(poles), GEOMETRY, (), built=frozenset(built))
+    return [(p.severity, p.obj, p.text) for p in finish(check_site(contents, lambda _: (SITE, ()))).problems]
 
 
 def moved(surface, x=0.0, y=0.0, z=0.0, name=None):
@@ -69,6 +65,17 @@ def test_a_missing_face_is_a_hole_and_an_island_is_none():
     wide = [(-50, -4, 50, -1), (-50, -1, -10, 1), (10, -1, 50, 1), (-50, 1, 50, 4)]
     island = Surface("roads", "island", np.concatenate([sheet(*box) for box in wide]))
     assert found(island, REGION, PAVEMENT) == []
+
+
+def test_no_warning_is_about_an_object_that_the_builder_made():
+    beside = moved(REGION, y=200, name="beside")
+    far, twin = Pole("far", np.array([0.0, 500.0, 0.0])), Pole("twin", np.array([10.0, 5.0, 0.0]))
+    same = dataclasses.replace(twin, name="same")
+    users = {obj for _, obj, _ in found(*SOUND.surfaces, beside, poles=(far, twin, same))}
+    assert users == {"beside", "far", "same"}
+    assert found(*SOUND.surfaces, beside, poles=(far, twin, same), built=("beside", "far", "twin", "same")) == []
+    assert [obj for _, obj, _ in found(*SOUND.surfaces, poles=(far, twin, same), built=("far", "same"))] == ["twin"]
+    assert one(found(ROAD, beside, PAVEMENT, built=("beside",)), "no road within") == ("ERROR", "beside")
 
 
 @pytest.mark.parametrize(("above", "complains"), [(0.3, True), (6.0, False)])

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from seip_addon.core.acceptance import Acceptance
-from seip_addon.core.choosing.placement.objective import Objective
+from seip_addon.core.choosing.placement.objective import ACCEPTED_MESSAGE, Objective
 from seip_addon.core.choosing.placement.scenarios import Scenarios
 from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import finish
@@ -79,6 +79,15 @@ def test_acceptance_ends_what_follows_the_search(small_survey):
     assert len(list(with_context(small_survey, solution))) > 3
     solution, rest = steps_to_end(with_context(small_survey, solution, acceptance), acceptance, 0)
     assert (solution.front, rest) == ((), 0)
+
+
+@pytest.mark.parametrize("goal", [Objective(count=4, min_distance=3.0), Objective(coverage=0.7)])
+def test_an_accepted_placement_has_one_note_on_the_end_of_its_search(small_survey, goal):
+    acceptance = Acceptance()
+    acceptance.accept()
+    placement = finish(place(small_survey, goal, acceptance=acceptance)).placement
+    assert placement.status == "feasible"
+    assert [note for note in placement.notes if "search" in note] == [ACCEPTED_MESSAGE]
 
 
 def test_acceptance_ends_the_search_for_other_numbers_of_sensors(small_survey):

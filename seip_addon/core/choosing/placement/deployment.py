@@ -120,7 +120,7 @@ class GainBand:
         if overlaps:
             types = dict.fromkeys(one for pair in overlaps for one in pair)
             bands = ", ".join(f"{one.sensor} {_span(one.low, one.high)}" for one in types)
-            messages.append(f"{UNRANKED}, as their bands overlap where the sensors are mounted: {bands}")
+            messages.append(f"{UNRANKED}, as their plausible coverages overlap where the sensors are mounted: {bands}")
         return tuple(messages)
 
 

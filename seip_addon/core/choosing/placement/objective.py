@@ -25,7 +25,8 @@ from .scenarios import Scenarios
 
 DEFAULT_COUNT = 4  # number of sensors if neither a number nor a budget nor a coverage is given: that of the study
 MOVED = "moved by hand"  # status of a placement whose sensors a user has moved
-MOVED_MESSAGE = "Moved by hand: evaluated at the sensors' current poses, without proof of optimality."
+MOVED_MESSAGE = "Evaluated at the sensors' current poses, without proof of optimality."
+ACCEPTED_MESSAGE = "accepted before the end of the search: running it to its end may find a better placement"
 CHOSEN_FOR = "chosen "  # beginning of a note on what was optimised in place of nominal coverage
 SAME_PRICE = "among equally cheap placements "  # beginning of the note on the coverage that another one may reach
 

@@ -15,9 +15,9 @@ GOOD_SHARE, FAIR_SHARE = 0.95, 0.8
 """Shares of the places with enough returns from which a placement is called good, and fair."""
 
 NOT_BY_DETECTION = (
-    "the criterion is expected returns, not detection: at ten junctions its best placement had 5 points less AP of "
-    "vehicles, 11 of two-wheelers and 7 of pedestrians than the best of about 106 (docs/open-benchmark.md); a choice "
-    "among finalists by detection may find more"
+    "the criterion is expected returns, not detection: at ten junctions the average precision of a detector with its "
+    "best placement was 5 points lower for vehicles, 11 for two-wheelers and 7 for pedestrians than with the best of "
+    "about 106 placements; a choice among finalists by detection may find more"
 )
 """Note on placements for returns that no detector has judged; the figures are those of the earlier detector."""
 

@@ -13,7 +13,7 @@ from ...sensing.scans.frame import Frame
 from ...sensing.scans.sensor import MountedSensor
 from ...storage.files import digest, save_json, whole_file
 from ..results.versions import versions
-from .format_interface import Format
+from .formats import Format
 from .sample import OUTCOMES, SPLITS, Sample, TrafficRun, make_sample, require_file_name
 
 SCHEMA = "seip-dataset/1"

@@ -1,8 +1,457 @@
-"""Formats of datasets by the names that a user types."""
+"""Formats of datasets: KITTI, OpenPCDet, mmdetection3d and PCD; and files of detections as detectors write them.
 
-from . import kitti, mmdetection3d, openpcdet, pcd
-from .format_interface import Format
+.. [1] A. Geiger, P. Lenz, R. Urtasun, "Are we ready for Autonomous Driving? The KITTI Vision Benchmark Suite", CVPR
+   2012; readme of the object development kit.
+.. [2] OpenPCDet, docs/CUSTOM_DATASET_TUTORIAL.md.
+.. [3] OpenPCDet, pcdet/datasets/custom/custom_dataset.py.
+.. [4] mmdetection3d, docs/en/user_guides/coord_sys_tutorial.md.
+.. [5] mmdetection3d, docs/en/advanced_guides/customize_dataset.md.
+.. [6] Point Cloud Library, "The PCD (Point Cloud Data) file format", version 0.7.
+"""
+
+import io
+import json
+import math
+import pickle
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from ...arrays import Float
+from ...errors import SeipError
+from ...geometry.orientation import quaternion_of
+from .sample import Sample, TrafficRun, cloud, shortest
+
+Files = dict[str, Callable[[], bytes]]
+"""What gives the bytes of each file, by its path in the folder of a dataset."""
+Splits = Mapping[str, Sequence[str]]
+"""Names of the samples of each split."""
+
+
+@dataclass(frozen=True)
+class Format:
+    """A format of datasets.
+
+    Parameters
+    ----------
+    key : str
+        What a user types.
+    name : str
+        For people.
+    classes : mapping of str to str
+        The format's name of each category of road users. One that is absent gets no label; empty for a format of
+        clouds alone.
+    sample_files : callable
+        From a `Sample` to its files: by path in the dataset's folder, what gives the bytes.
+    index_files : callable
+        From the dataset's folder and the names of the samples by split to the bytes of the files of the dataset as a
+        whole, by path; called when all samples are written.
+    notes : callable
+        From a `TrafficRun` to sentences that its users should know. Raises `SeipError` where the format cannot be
+        written here.
+    """
+
+    key: str
+    name: str
+    classes: Mapping[str, str]
+    sample_files: Callable[[Sample], Files]
+    index_files: Callable[[Path, Splits], Mapping[str, bytes]] = lambda _folder, _splits: {}
+    notes: Callable[[TrafficRun], tuple[str, ...]] = lambda _run: ()
+
+
+CLASSES = {
+    "car": "Car",
+    "van": "Van",
+    "truck": "Truck",
+    "bus": "Bus",
+    "motorcycle": "Motorcycle",
+    "bicycle": "Cyclist",
+    "pedestrian": "Pedestrian",
+}
+"""Names of the categories where a format leaves the choice to its user: KITTI's, as far as they go."""
+
+
+def label_lines(sample: Sample, xyz: Float) -> str:
+    """Return a line ``x y z dx dy dz heading class`` for each box, from which the same float64 are read back.
+
+    Parameters
+    ----------
+    xyz : (k, 3) float64, metres
+        The place of each box by which the format goes.
+    """
+    boxes = sample.boxes
+    values = np.column_stack([xyz, boxes.size, boxes.yaw])
+    return "".join(
+        f"{' '.join(shortest(value) for value in row)} {name}\n"
+        for row, name in zip(values, sample.classes, strict=True)
+    )
+
+
+def read_labels(path: Path) -> tuple[Float, list[str]]:
+    """Return the boxes, (k, 7) float64, and their classes from a file of `label_lines`."""
+    rows = [line.split() for line in path.read_text(encoding="utf-8").splitlines()]
+    return np.array([row[:7] for row in rows], dtype=np.float64).reshape(-1, 7), [row[7] for row in rows]
+
+
+def image_sets(splits: Splits) -> dict[str, bytes]:
+    """Return ``ImageSets/SPLIT.txt``: the name of a sample on each line."""
+    return {
+        f"ImageSets/{split}.txt": "".join(f"{name}\n" for name in names).encode() for split, names in splits.items()
+    }
+
+
+KITTI_CLASS = {
+    "Car": "Car",
+    "Van": "Van",
+    "Truck": "Truck",
+    "Bus": "Truck",
+    "Motorcycle": "Cyclist",
+    "Cyclist": "Cyclist",
+    "Pedestrian": "Pedestrian",
+    "DontCare": "DontCare",
+}
+"""As which of KITTI's classes each is evaluated, which is all that OpenPCDet evaluates a custom dataset by."""
+
+NO_OPENPCDET_LABEL = "0.0 0.0 0.0 1.0 1.0 1.0 0.0 DontCare\n"  # the label of a frame without any
+PLAN_STEP = 6.4  # what the range is a multiple of in plan, metres: 16 pillars of 0.4, 32 of 0.2 or 64 of 0.1 m
+HEIGHT_STEP = 2.0  # what the range is a multiple of in height, metres: 40 voxels of 0.05 m, as networks ask for
+MARGIN = 0.5  # between the boxes and the range, metres
+
+PILLAR_SIZE = 0.2
+
+
+def _openpcdet_files(sample: Sample) -> Files:
+    """Return ``points`` and ``labels`` of a sample.
+
+    Boxes are the middle, the size and the heading counter-clockwise from +x, so that nothing is converted [2]_. The
+    reader stumbles over a frame without a label, and drops labels called ``DontCare`` [3]_: such a frame gets one of
+    these, and stays in its split, where a detection in it is a false one.
+    """
+    return {
+        f"points/{sample.name}.npy": lambda: _npy(sample),
+        f"labels/{sample.name}.txt": lambda: (
+            label_lines(sample, sample.boxes.centre).encode() or NO_OPENPCDET_LABEL.encode()
+        ),
+    }
+
+
+def _openpcdet_index(folder: Path, splits: Splits) -> dict[str, bytes]:
+    """Return the splits, and a configuration whose range holds every box."""
+    return {**image_sets(splits), "custom_dataset.yaml": _configuration(_label_boxes(folder, splits)).encode()}
+
+
+def point_cloud_range(boxes: Float) -> Float:
+    """Return x, y, z from and to, (6,) float64 in metres, that hold all boxes, multiples of `PLAN_STEP`, `HEIGHT_STEP`.
+
+    Parameters
+    ----------
+    boxes : (k, 7) float64
+        Middle, size, heading; without any the range lies around the origin.
+    """
+    x, y, z, length, width, height, heading = boxes.T if len(boxes) else np.zeros((7, 1))
+    along, across = np.abs(np.cos(heading)), np.abs(np.sin(heading))
+    reach = np.column_stack([along * length + across * width, across * length + along * width, height]) / 2 + MARGIN
+    middle = np.column_stack([x, y, z])
+    low, high = (middle - reach).min(axis=0), (middle + reach).max(axis=0)
+    centre = np.round((low[:2] + high[:2]) / 2, 1)
+    half = PLAN_STEP / 2 * np.ceil(np.maximum(high[:2] - centre, centre - low[:2]) / (PLAN_STEP / 2))
+    bottom = math.floor(low[2] * 10) / 10
+    top = bottom + HEIGHT_STEP * math.ceil((high[2] - bottom) / HEIGHT_STEP)
+    return np.round([*(centre - half), bottom, *(centre + half), top], 1)
+
+
+def _npy(sample: Sample) -> bytes:
+    buffer = io.BytesIO()
+    np.save(buffer, cloud(sample.frame), allow_pickle=False)
+    return buffer.getvalue()
+
+
+def _label_boxes(folder: Path, splits: Splits) -> Float:
+    boxes = [np.empty((0, 7))]
+    for name in (name for names in splits.values() for name in names):
+        found, classes = read_labels(folder / f"labels/{name}.txt")
+        boxes.append(found[[kind != "DontCare" for kind in classes]])
+    return np.concatenate(boxes)
+
+
+def _configuration(boxes: Float) -> str:
+    """Return the YAML text: values that JSON writes are YAML too."""
+    extent = point_cloud_range(boxes)
+    features = ["x", "y", "z", "intensity"]
+    values = {
+        "DATASET": "CustomDataset",
+        "DATA_PATH": "../data/custom",
+        "CLASS_NAMES": list(CLASSES.values()),
+        "POINT_CLOUD_RANGE": extent.tolist(),
+        "MAP_CLASS_TO_KITTI": KITTI_CLASS,
+        "DATA_SPLIT": {"train": "train", "test": "val"},
+        "INFO_PATH": {"train": ["custom_infos_train.pkl"], "test": ["custom_infos_val.pkl"]},
+        "POINT_FEATURE_ENCODING": {
+            "encoding_type": "absolute_coordinates_encoding",
+            "used_feature_list": features,
+            "src_feature_list": features,
+        },
+        "DATA_AUGMENTOR": {
+            "DISABLE_AUG_LIST": ["placeholder"],
+            "AUG_CONFIG_LIST": [
+                {"NAME": "random_world_flip", "ALONG_AXIS_LIST": ["x", "y"]},
+                {"NAME": "random_world_rotation", "WORLD_ROT_ANGLE": [-0.78539816, 0.78539816]},
+                {"NAME": "random_world_scaling", "WORLD_SCALE_RANGE": [0.95, 1.05]},
+            ],
+        },
+        "DATA_PROCESSOR": [
+            {"NAME": "mask_points_and_boxes_outside_range", "REMOVE_OUTSIDE_BOXES": True},
+            {"NAME": "shuffle_points", "SHUFFLE_ENABLED": {"train": True, "test": False}},
+            {
+                "NAME": "transform_points_to_voxels",
+                "VOXEL_SIZE": [PILLAR_SIZE, PILLAR_SIZE, round(float(extent[5] - extent[2]), 1)],
+                "MAX_POINTS_PER_VOXEL": 32,
+                "MAX_NUMBER_OF_VOXELS": {"train": 40000, "test": 40000},
+            },
+        ],
+    }
+    head = "# CLASS_NAMES: for the model's configuration. What next: OpenPCDet, docs/CUSTOM_DATASET_TUTORIAL.md\n"
+    return head + "".join(f"{key}: {json.dumps(value)}\n" for key, value in values.items())
+
+
+LABELS = {name: number for number, name in enumerate(CLASSES.values())}
+PICKLE_PROTOCOL = 4  # whichever Python writes it, the bytes are the same
+
+
+def _mmdetection3d_files(sample: Sample) -> Files:
+    """Return ``points`` (float32) and ``labels`` of a sample, as version 1.1 of mmdetection3d has them.
+
+    Boxes are in LiDAR coordinates: heading counter-clockwise from +x, and the middle of the **underside** [4]_. The
+    text files are those that the documentation asks of a custom dataset [5]_; the information files are made from them.
+    """
+    boxes = sample.boxes
+    underside = boxes.centre - boxes.size * np.array([0.0, 0.0, 0.5])
+    return {
+        f"points/{sample.name}.bin": lambda: cloud(sample.frame).tobytes(),
+        f"labels/{sample.name}.txt": lambda: label_lines(sample, underside).encode(),
+    }
+
+
+def _mmdetection3d_index(folder: Path, splits: Splits) -> dict[str, bytes]:
+    """Return the splits and their information files."""
+    infos = {f"custom_infos_{split}.pkl": _information(folder, names) for split, names in splits.items()}
+    return {**image_sets(splits), **infos}
+
+
+def _information(folder: Path, names: Sequence[str]) -> bytes:
+    value = {
+        "metainfo": {"categories": LABELS, "dataset": "custom", "info_version": "1.1"},
+        "data_list": [
+            {
+                "sample_idx": int(name),
+                "lidar_points": {"num_pts_feats": 4, "lidar_path": f"{name}.bin"},
+                "instances": _instances(folder / f"labels/{name}.txt"),
+            }
+            for name in names
+        ],
+    }
+    return pickle.dumps(value, protocol=PICKLE_PROTOCOL)
+
+
+def _instances(path: Path) -> list[dict[str, Any]]:
+    boxes, classes = read_labels(path)
+    return [{"bbox_3d": box, "bbox_label_3d": LABELS[name]} for box, name in zip(boxes.tolist(), classes, strict=True)]
+
+
+KITTI_CLASSES = {
+    "car": "Car",
+    "van": "Van",
+    "truck": "Truck",
+    "bus": "Truck",
+    "motorcycle": "Cyclist",
+    "bicycle": "Cyclist",
+    "pedestrian": "Pedestrian",
+}
+"""KITTI has neither buses nor motorcycles; readers ignore or refuse a name that it does not have."""
+
+NO_KITTI_LABEL = "DontCare -1 -1 -10 0 0 0 0 -1 -1 -1 -1000 -1000 -1000 -10\n"  # the label of a frame without any
+PIXELS = 100  # width and height of the empty picture and of each box in it
+
+_IDENTITY = "1 0 0 0 0 1 0 0 0 0 1 0"
+CALIBRATION = "".join(
+    f"{name}: {numbers}\n"
+    for name, numbers in {
+        **dict.fromkeys(("P0", "P1", "P2", "P3"), _IDENTITY),
+        "R0_rect": "1 0 0 0 1 0 0 0 1",
+        "Tr_velo_to_cam": "0 -1 0 0 0 0 -1 0 1 0 0 0",
+        "Tr_imu_to_velo": _IDENTITY,
+    }.items()
+)
+
+FULLY_VISIBLE, PARTLY_VISIBLE = 0.8, 0.4
+"""Visibility from which an object counts as fully visible (0) and as partly occluded (1) and not largely (2)."""
+
+
+def _kitti_files(sample: Sample) -> Files:
+    """Return ``velodyne``, ``label_2``, ``calib`` and ``image_2`` of a sample, with a camera in the origin along +x.
+
+    Labels are in the camera's axes (x right, y down, z forward): the middle of the underside, height, width, length,
+    and the rotation about y, which is −heading − π/2 [1]_. The calibration turns axes and nothing else, so that what
+    comes back in LiDAR axes is exact. Evaluators leave out objects less than 25 or 40 pixels high: each box in the
+    picture is 100 × 100. Its readers want a picture and, of a frame without labels, a line ``DontCare``, as KITTI has.
+    """
+    part = "testing" if sample.run.split == "test" else "training"
+    return {
+        f"{part}/velodyne/{sample.name}.bin": lambda: cloud(sample.frame).tobytes(),
+        f"{part}/label_2/{sample.name}.txt": partial(_label_file, sample),
+        f"{part}/calib/{sample.name}.txt": CALIBRATION.encode,
+        f"{part}/image_2/{sample.name}.png": _empty_picture,
+    }
+
+
+def _label_file(sample: Sample) -> bytes:
+    boxes = sample.boxes
+    numbers, alpha = camera_boxes(boxes.centre, boxes.size, boxes.yaw)
+    occluded = np.where(boxes.visibility >= FULLY_VISIBLE, 0, np.where(boxes.visibility >= PARTLY_VISIBLE, 1, 2))
+    lines = "".join(
+        f"{name} 0 {hidden} {shortest(angle)} 0 0 {PIXELS} {PIXELS} {' '.join(shortest(number) for number in row)}\n"
+        for name, hidden, angle, row in zip(sample.classes, occluded, alpha, numbers, strict=True)
+    )
+    return (lines or NO_KITTI_LABEL).encode()
+
+
+def camera_boxes(centre: Float, size: Float, yaw: Float) -> tuple[Float, Float]:
+    """Return boxes in the camera's axes.
+
+    Parameters
+    ----------
+    centre, size : (k, 3) float64, metres
+        Middle, and length, width, height.
+    yaw : (k,) float64, radians
+
+    Returns
+    -------
+    numbers : (k, 7) float64
+        Height, width, length, the middle of the underside, and the rotation about y.
+    alpha : (k,) float64, radians
+        The angle at which the camera sees each.
+    """
+    length, width, height = size.T
+    x, y, z = centre.T
+    camera = np.column_stack([-y, height / 2 - z, x])
+    rotation = _wrapped(-yaw - np.pi / 2)
+    # rounded: numpy's versions differ in the last digit of an arctangent
+    alpha = np.round(_wrapped(rotation - np.arctan2(camera[:, 0], camera[:, 2])), 6)
+    return np.column_stack([height, width, length, camera, rotation]), alpha
+
+
+def _wrapped(angle: Float) -> Float:
+    """Return angles in [-π, π)."""
+    wrapped: Float = np.mod(angle + np.pi, 2 * np.pi) - np.pi
+    return wrapped
+
+
+def _empty_picture() -> bytes:
+    buffer = io.BytesIO()
+    Image.new("RGB", (PIXELS, PIXELS)).save(buffer, "PNG")
+    return buffer.getvalue()
+
+
+MERGED = "merged"
+IDENTITY = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)  # viewpoint in the origin
+POINT_TYPE = np.dtype([("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("intensity", "<f4")])
+
+
+def _pcd_files(sample: Sample) -> Files:
+    """Return ``SPLIT/RUN/SENSOR/FRAME.pcd`` of every sensor and of all together, binary [6]_.
+
+    All clouds are in the site's local axes, so that they lie over each other when they are opened together. The
+    viewpoint of a sensor's cloud is the sensor's pose, that of the merged cloud is the identity.
+    """
+    points = cloud(sample.frame)
+
+    def only(number: int) -> Callable[[], bytes]:
+        sensor = sample.run.sensors[number]
+        viewpoint = (*sensor.xyz.tolist(), *quaternion_of(sensor.orientation).tolist())
+        return lambda: encode(points[sample.frame.sensor == number].view(POINT_TYPE)[:, 0], viewpoint)
+
+    labels = [sensor.label for sensor in sample.run.sensors]
+    clouds = {MERGED: lambda: encode(points.view(POINT_TYPE)[:, 0])}
+    clouds |= {label: only(number) for number, label in enumerate(labels)}
+    run = sample.run
+    return {f"{run.split}/{run.name}/{folder}/{sample.frame_id}.pcd": content for folder, content in clouds.items()}
+
+
+def encode(points: NDArray[Any], viewpoint: Sequence[float] = IDENTITY) -> bytes:
+    """Return a structured array of little-endian float32 fields, (n,), as a binary PCD file.
+
+    Parameters
+    ----------
+    viewpoint : sequence of 7 float
+        Position (metres) and orientation (quaternion w, x, y, z) of the sensor in the axes of the points.
+    """
+    names = points.dtype.names or ()
+    lines = (
+        "# .PCD v0.7 - Point Cloud Data file format",
+        "VERSION 0.7",
+        f"FIELDS {' '.join(names)}",
+        f"SIZE {' '.join('4' for _ in names)}",
+        f"TYPE {' '.join('F' for _ in names)}",
+        f"COUNT {' '.join('1' for _ in names)}",
+        f"WIDTH {len(points)}",
+        "HEIGHT 1",
+        f"VIEWPOINT {' '.join(f'{round(number, 9) + 0.0:.12g}' for number in viewpoint)}",
+        f"POINTS {len(points)}",
+        "DATA binary",
+    )
+    return ("\n".join(lines) + "\n").encode() + points.tobytes()
+
+
+def _pcd_notes(run: TrafficRun) -> tuple[str, ...]:
+    """Note nothing, but see that no sensor is called as the merged cloud is."""
+    if any(sensor.label.lower() == MERGED for sensor in run.sensors):
+        raise SeipError(f"a sensor is called '{MERGED}', as is the folder of the merged cloud; rename its empty")
+    return ()
+
+
+def kitti_results(boxes: Float, categories: Sequence[str], score: Float) -> str:
+    """Return a line of KITTI's results for each detection: a label, and the score.
+
+    Parameters
+    ----------
+    boxes : (k, 7) float64
+        x, y, z of the middle, length, width, height (metres), yaw (radians), local site axes.
+    categories : sequence of str
+        Category of each box.
+    score : (k,) float64, 0 to 1
+    """
+    numbers, alpha = camera_boxes(boxes[:, :3], boxes[:, 3:6], boxes[:, 6])
+    return "".join(
+        f"{KITTI_CLASSES[category]} -1 -1 {shortest(angle)} 0 0 {PIXELS} {PIXELS} "
+        f"{' '.join(shortest(value) for value in row)} {shortest(points)}\n"
+        for category, angle, row, points in zip(categories, alpha, numbers, score, strict=True)
+    )
+
+
+def openpcdet_results(boxes: Float, categories: Sequence[str], score: Float) -> str:
+    """Return a line ``x y z dx dy dz heading class score`` for each detection; see `kitti_results`."""
+    return "".join(
+        f"{' '.join(shortest(value) for value in row)} {CLASSES[category]} {shortest(points)}\n"
+        for row, category, points in zip(boxes, categories, np.asarray(score), strict=True)
+    )
+
 
 FORMATS: dict[str, Format] = {
-    kind.key: kind for kind in (openpcdet.FORMAT, mmdetection3d.FORMAT, kitti.FORMAT, pcd.FORMAT)
+    kind.key: kind
+    for kind in (
+        Format("openpcdet", "OpenPCDet's custom dataset", CLASSES, _openpcdet_files, _openpcdet_index),
+        Format("mmdetection3d", "mmdetection3d's format", CLASSES, _mmdetection3d_files, _mmdetection3d_index),
+        Format(
+            *("kitti", "KITTI's object detection format", KITTI_CLASSES, _kitti_files),
+            lambda _folder, splits: image_sets(splits),
+        ),
+        Format("pcd", "PCD clouds", {}, _pcd_files, notes=_pcd_notes),
+    )
 }
+"""Formats of datasets by the names that a user types."""

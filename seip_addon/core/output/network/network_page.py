@@ -12,7 +12,7 @@ from ...arrays import Integer
 from ...counts import counted, round_number
 from ..pictures.drawing import percent
 from ..pictures.palette import INK, PAPER, PAPER_STREETS, SHARE_COLOURS, SOFT_INK
-from ..report.html import STYLE
+from ..report.html import page
 from ..report.wording import dollars
 from .network_record import NetworkRecord, NetworkSite
 from .network_view import BARE_RADIUS, NetworkView, Street, legend_money, network_view, radius_of
@@ -64,7 +64,6 @@ def network_page(record: NetworkRecord, streets: Sequence[Street] | None = None)
     """Return the page; its links lead to the folders of the sites beside it."""
     view = network_view(record, streets, SHAPES)
     ranked = ranked_sites(record)
-    policy = "default-src 'none'; style-src 'unsafe-inline'"
     equipped = sum(site.status == "equipped" for site in record.sites)
     summary = (
         f"{equipped:,} of {counted(len(record.sites), 'site has', 'sites have')} sensors for "
@@ -74,17 +73,7 @@ def network_page(record: NetworkRecord, streets: Sequence[Street] | None = None)
         else "No site has sensors."
     )
     credits_ = "".join(f"<div>{escape(line)}</div>" for line in record.attribution)
-    return f"""<!DOCTYPE html>
-<html lang="en">
-<head>
-<meta charset="utf-8">
-<meta http-equiv="Content-Security-Policy" content="{escape(policy)}">
-<meta name="viewport" content="width=device-width, initial-scale=1">
-<title>{escape(record.name)}</title>
-<style>{STYLE}{MAP_STYLE}</style>
-</head>
-<body>
-<header>
+    body = f"""<header>
 <h1><bdi>{escape(record.name)}</bdi></h1>
 <p class="subtitle">{escape(summary)}</p>
 </header>
@@ -97,10 +86,8 @@ def network_page(record: NetworkRecord, streets: Sequence[Street] | None = None)
 <div class="wide">
 {_table(record, ranked)}
 </div>
-</main>
-</body>
-</html>
-"""
+</main>"""
+    return page(record.name, body, MAP_STYLE)
 
 
 def _map(record: NetworkRecord, view: NetworkView, ranked: tuple[RankedSite, ...]) -> str:
@@ -146,7 +133,7 @@ def _described(record: NetworkRecord, site: NetworkSite) -> str:
         return site.status
     seen = f"{percent(site.coverage)} of the road seen"
     typical = "" if record.criterion == "road" else f"{outcome(record, site.value)} typical returns, "
-    return f"{sensors_text(site.sensors)}, {dollars(site.price_usd)}, {typical}{seen}"
+    return f"{sensors_text(site.sensors, record.sensor_names)}, {dollars(site.price_usd)}, {typical}{seen}"
 
 
 def _scale(view: NetworkView) -> str:
@@ -192,7 +179,7 @@ def _row(record: NetworkRecord, one: RankedSite) -> str:
     value = percent(site.coverage) if record.criterion == "road" else outcome(record, site.value)
     figures = (value, gain_text(record, one.gain), dollars(site.price_usd)) if equipped else ("–", "–", "–")
     cells = "".join(f'<td class="number">{words}</td>' for words in figures)
-    sensors = sensors_text(site.sensors) if equipped else _described(record, site)
+    sensors = sensors_text(site.sensors, record.sensor_names) if equipped else _described(record, site)
     place = "./" + quote(site.folder, safe="/")
     files = ", ".join(
         f'<a href="{escape(f"{place}/{file}")}">{word}</a>'

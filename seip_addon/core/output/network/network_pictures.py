@@ -9,9 +9,8 @@ from matplotlib.lines import Line2D
 
 from ...arrays import Float
 from ..pictures.chart_style import add_legend, new_figure, set_title, style_axes
-from ..pictures.drawing import add_axes, as_png, credits_box, draw_attribution, draw_callouts, new_page
+from ..pictures.drawing import Style, add_axes, as_png, credits_box, draw_attribution, draw_callouts, new_page
 from ..pictures.palette import INK, PAPER, PAPER_STREETS, SHARE_COLOURS, SOFT_INK
-from ..pictures.plan_style import Style
 from ..pictures.scale_bar import draw_north, draw_scale, north_paper, scale_paper
 from ..report.wording import dollars
 from .network_record import NetworkRecord

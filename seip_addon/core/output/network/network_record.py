@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Any, Literal
 
 from ...storage.json_dataclass import as_json
@@ -109,6 +110,10 @@ class NetworkRecord:
         out.
     curve : tuple of NetworkPoint
         Value of the network for amounts of money; prices rise.
+    sensor_types : tuple of str
+        Types to choose from, by their keys in the catalogue.
+    sensor_names : mapping of str to str
+        Name of the product for each key.
     created : str
         Time of the placement (ISO 8601), "" if it is not recorded.
     goal : float, optional
@@ -127,6 +132,7 @@ class NetworkRecord:
     sites: tuple[NetworkSite, ...]
     curve: tuple[NetworkPoint, ...]
     sensor_types: tuple[str, ...]
+    sensor_names: Mapping[str, str] = field(default_factory=dict)
     attribution: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     created: str = ""
@@ -147,10 +153,12 @@ class NetworkRecord:
             if self.least_usd >= self.price_usd * (1.0 - PROVEN):
                 return f"Proven: nothing cheaper among these sites and candidates sees {whole}."
             return f"Nothing for less than ${self.least_usd:,.0f} sees {whole}: at most {self.saving:.2%} can be saved."
-        what = "returns from road users" if self.criterion == "returns" else "road seen"
-        if self.gap <= PROVEN:
-            return f"Proven: no other use of {money} among these sites and candidates has more {what}."
-        return f"At most {self.gap:.2%} more {what} is possible for {money} among these sites and candidates."
+        use = f"Proven: no other use of {money} among these sites and candidates"
+        if self.criterion == "road":
+            most = "" if self.gap <= PROVEN else f" than {math.ceil(self.bound * 1000 - 1e-6) / 10:.1f}%"
+            return f"{use} sees more{most} of the road."
+        most = "" if self.gap <= PROVEN else f" than {math.ceil(10 * math.expm1(self.bound) - 1e-6) / 10:,.1f}"
+        return f"{use} has more{most} returns from a typical road user."
 
     @property
     def saving(self) -> float:

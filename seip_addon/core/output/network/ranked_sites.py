@@ -60,10 +60,10 @@ def _gain(site: NetworkSite, relative_weight: float) -> float | None:
     return relative_weight * site.value / site.price_usd * 1000.0
 
 
-def sensors_text(sensors: Sequence[NetworkSensor], names: Mapping[str, str] | None = None) -> str:
-    """Return the number of sensors of each type, most frequent first: ``2 × os1-128, 1 × vlp32c``."""
+def sensors_text(sensors: Sequence[NetworkSensor], names: Mapping[str, str]) -> str:
+    """Return the number of sensors of each type, by name or key, most frequent first: ``2 × OS1-128, 1 × VLP-32C``."""
     types = Counter(sensor.sensor for sensor in sensors)
-    return ", ".join(f"{number} × {(names or {}).get(key, key)}" for key, number in types.most_common())
+    return ", ".join(f"{number} × {names.get(key, key)}" for key, number in types.most_common())
 
 
 def outcome(record: NetworkRecord, value: float) -> str:

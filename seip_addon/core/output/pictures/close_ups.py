@@ -18,6 +18,7 @@ from .close_up_sheet import MOST, TILE, close_up_sheet
 from .drawing import (
     MARK_RADIUS,
     SENSOR_MARK,
+    Style,
     add_axes,
     as_png,
     credits_box,
@@ -28,7 +29,6 @@ from .drawing import (
 )
 from .palette import INK, PAPER
 from .plan_map import SENSOR, MapContent, Window, draw_map, draw_street_names, map_content
-from .plan_style import Style
 from .scale_bar import draw_scale, scale_paper
 from .viewpoint import Viewpoint, frame
 

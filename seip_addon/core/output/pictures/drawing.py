@@ -25,9 +25,12 @@ from ...storage.files import whole_file
 from .callouts import place_callouts
 from .palette import INK, PAPER, SOFT_INK
 
+Style = dict[str, Any]
+"""Keyword arguments of matplotlib."""
+
 MARKERS = ("o", "s", "^", "D", "v", "P", "h", "X")
-SENSOR_MARK: dict[str, Any] = {"linestyle": "none", "markersize": 11.0, "mfc": INK, "mec": PAPER, "mew": 1.6}
-HIDDEN_MARK: dict[str, Any] = {"mfc": "none", "mec": INK, "mew": 2.0}
+SENSOR_MARK: Style = {"linestyle": "none", "markersize": 11.0, "mfc": INK, "mec": PAPER, "mew": 1.6}
+HIDDEN_MARK: Style = {"mfc": "none", "mec": INK, "mew": 2.0}
 MARK_RADIUS, LABEL_SIZE, LABEL_PADDING = 8.0, 10.0, 0.35  # points, points, share of the size
 MANY_MARK_SIZE = 8.0  # points
 ATTRIBUTION_SIZE = 8.5  # points
@@ -226,8 +229,8 @@ def draw_attribution(axes: Axes, attribution: Sequence[str]) -> None:
     """Write the credits of a map's sources at its lower right corner, over what is drawn there."""
     if not attribution:
         return
-    paper: dict[str, Any] = {"boxstyle": "square,pad=0.25", "facecolor": PAPER, "alpha": 0.85, "edgecolor": "none"}
-    style: dict[str, Any] = {
+    paper: Style = {"boxstyle": "square,pad=0.25", "facecolor": PAPER, "alpha": 0.85, "edgecolor": "none"}
+    style: Style = {
         "ha": "right",
         "va": "bottom",
         "size": ATTRIBUTION_SIZE,

@@ -16,6 +16,7 @@ from ...site.site import Site
 from .coverage_colours import Legend
 from .drawing import (
     ATTRIBUTION_SIZE,
+    Style,
     credits_of,
     draw_sensors,
     heading_of,
@@ -25,7 +26,6 @@ from .drawing import (
     text_width,
 )
 from .palette import INK, PAPER
-from .plan_style import Style
 
 DPI = 160
 LEGEND_LINE, CREDIT_LINE, MARGIN = 0.3, 0.19, 0.2  # inches

@@ -9,7 +9,7 @@ import numpy as np
 import shapely
 from matplotlib import patheffects
 from matplotlib.axes import Axes
-from matplotlib.colors import Normalize
+from matplotlib.colors import LinearSegmentedColormap, Normalize
 from matplotlib.patches import PathPatch, Wedge
 from matplotlib.path import Path
 from shapely.geometry.base import BaseGeometry
@@ -21,17 +21,8 @@ from ...site.scene_geometry import ASSUMED, OTHER_LEVELS, Mesh, SceneGeometry
 from ...site.site import Site
 from ...site.target_squares import target_squares
 from .coverage_colours import of_placement
-from .drawing import MARK_RADIUS, draw_polygons, is_writable, text_width
-from .palette import FORBIDDEN, INK, MANDATORY, PAPER, SOFT_INK, WEIGHTED
-from .plan_style import (
-    ASSUMED_HEIGHT,
-    ASSUMED_MARK,
-    HEIGHT_CMAP,
-    OTHER_ROAD,
-    POLE_MARK,
-    SIDEWALK_MARK,
-    Style,
-)
+from .drawing import MARK_RADIUS, Style, draw_polygons, is_writable, text_width
+from .palette import ASSUMED_POLE_COLOUR, FORBIDDEN, INK, MANDATORY, PAPER, POLE_COLOUR, SOFT_INK, WEIGHTED
 
 ARROW_LENGTH, WEDGE_LENGTH = 0.34, 0.5  # inches
 LAND, PAVEMENT, ROAD, KERB = "#edefe9", "#e2dacb", "#dcdfe3", "#8f949a"
@@ -40,6 +31,14 @@ MIN_PLAN_AREA = 1e-6  # square metres in plan, below which a triangle is a wall'
 NAME_SIZE = 9.5  # points, of the names of streets
 MIN_NAME_ROOM = 1.15  # length of a street on the map, in lengths of its name, from which on it is named
 NAME_SHIFTS = (0.0, 0.4, -0.4, 0.8, -0.8)  # of the name along its street, in shares of the room on each side
+
+HEIGHT_CMAP = LinearSegmentedColormap.from_list("heights", ("#d2d0c4", "#8b9285", "#4b5350"))
+SIDEWALK_MARK: Style = {"linestyle": "none", "marker": "o", "markersize": 2.6, "mfc": PAPER, "mec": INK, "mew": 0.5}
+ASSUMED_HEIGHT: Style = {"facecolor": "none", "edgecolor": "#c9cdc4", "hatch": "\\\\\\", "linewidth": 0.4}
+OTHER_ROAD: Style = {"facecolor": "#d6d9d8", "edgecolor": "#b4b9ba", "linewidth": 0.4}
+"""A road on another level than the studied one."""
+POLE_MARK: Style = {"linestyle": "none", "marker": "D", "markersize": 3.8, "mfc": POLE_COLOUR, "mec": INK, "mew": 0.6}
+ASSUMED_MARK: Style = POLE_MARK | {"mfc": PAPER, "mec": ASSUMED_POLE_COLOUR, "mew": 0.9}
 
 SURFACE, EDGE, TARGET, OBSTACLE, BORDER, CANDIDATE, TEXT, SENSOR = range(8)
 Window = tuple[float, float, float, float]
@@ -107,7 +106,7 @@ def draw_street_names(
         spare = (float(np.ptp(reach)) - MIN_NAME_ROOM * length) / 2
         half = np.abs(along) * length / 2 + NAME_SIZE / 72 * inch * 0.7
         tried = [middle + share * max(spare, 0.0) * along for share in NAME_SHIFTS]
-        free = [at for at in tried if not any(overlap((*(at - half), *(at + half)), box) for box in (*taken, *boxes))]
+        free = [at for at in tried if not any(_overlap((*(at - half), *(at + half)), box) for box in (*taken, *boxes))]
         if spare < 0 or not free:
             continue
         angle = (math.degrees(math.atan2(along[1], along[0])) + 90.0) % 180.0 - 90.0
@@ -120,7 +119,7 @@ def draw_street_names(
     return boxes
 
 
-def overlap(one: Window, other: Window) -> bool:
+def _overlap(one: Window, other: Window) -> bool:
     """Return whether two boxes overlap, each given by left, bottom, right and top."""
     return one[0] < other[2] and other[0] < one[2] and one[1] < other[3] and other[1] < one[3]
 

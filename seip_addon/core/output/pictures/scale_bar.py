@@ -5,8 +5,8 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Rectangle
 
 from ...counts import round_number
+from .drawing import Style
 from .palette import INK, PAPER
-from .plan_style import Style
 
 SCALE_SIZE = 9.0  # points
 TEXT = 6.0  # drawing order: over the map and under its sensors

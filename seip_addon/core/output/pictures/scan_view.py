@@ -5,21 +5,19 @@ from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.colors import LinearSegmentedColormap, to_rgb
+from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
-from ...arrays import Float
 from ...counts import counted
 from ...sensing.scans.frame import Frame, Labels
 from ...sensing.scans.sensor import MountedSensor
-from .cloud_colours import sensor_colour
-from .drawing import LABEL_SIZE, SENSOR_MARK, add_axes, draw_attribution, draw_polygons, save_png
-from .palette import INK, INTENSITY_COLOURS, MAX_INTENSITY, PAPER, SEEN_COLOURS, SOFT_INK
+from .cloud_colours import By, cloud_colours, sensor_colour, strength_ramp
+from .drawing import LABEL_SIZE, SENSOR_MARK, Style, add_axes, box_corners, draw_attribution, draw_polygons, save_png
+from .palette import INK, MAX_INTENSITY, PAPER, SEEN_COLOURS, SOFT_INK
 from .plan_map import draw_area
-from .plan_style import Style
 from .scale_bar import draw_scale
 
 DPI = 160
@@ -27,7 +25,6 @@ MAP_SIDE, MARGIN, HEAD, FOOT = 8.0, 0.3, 0.95, 0.55  # inches
 MARGIN_SHARE = 0.04  # of the region's size, shown around it
 PIXELS = 1100  # of a cloud's picture, along a side
 BACKGROUND_COLOUR = "#101820"
-INTENSITY_CMAP = LinearSegmentedColormap.from_list("strength", INTENSITY_COLOURS)
 SEEN_COLOUR, UNSEEN_COLOUR = PAPER, SEEN_COLOURS[0]
 
 
@@ -49,32 +46,26 @@ def save_scan_view(
     attribution : sequence of str
         Credits that the sources of the scene demand.
     """
-    figure = draw_scan(frame, region, sensors)
-    draw_attribution(figure.axes[-1], attribution)
-    save_png(path, figure)
-
-
-def draw_scan(frame: Frame, region: BaseGeometry, sensors: Sequence[MountedSensor]) -> Figure:
-    """Return the view as a figure."""
     west, south, east, north = region.bounds
     left, bottom, right, top = region.buffer(MARGIN_SHARE * max(east - west, north - south)).bounds
     tall = MAP_SIDE * (top - bottom) / (right - left)
     figure = Figure((2 * MAP_SIDE + 3 * MARGIN, tall + HEAD + FOOT), dpi=DPI, facecolor=PAPER)
-    palette = np.array([to_rgb(sensor_colour(number)) for number in range(len(sensors))])
-    colours = (palette[frame.sensor], INTENSITY_CMAP(np.sqrt(np.minimum(frame.intensity / MAX_INTENSITY, 1.0)))[:, :3])
-    for number, colour in enumerate(colours):
+    by_kind: tuple[By, ...] = ("sensor", "intensity")
+    for number, by in enumerate(by_kind):
         axes = add_axes(figure, MARGIN + number * (MAP_SIDE + MARGIN), FOOT, MAP_SIDE, tall)
         axes.set(xlim=(left, right), ylim=(bottom, top), facecolor=BACKGROUND_COLOUR)
-        _draw_points(axes, frame.points, colour)
+        _draw_points(axes, frame.points, cloud_colours(frame, by)[:, :3])
         draw_area(axes, region, facecolor="none", edgecolor=SOFT_INK, linewidth=0.9)
         _draw_boxes(axes, frame.labels)
-        _draw_sensors(axes, sensors, palette if number == 0 else np.ones((len(sensors), 3)))
+        colours = [sensor_colour(one) if by == "sensor" else PAPER for one in range(len(sensors))]
+        _draw_sensors(axes, sensors, colours)
         draw_scale(axes, (right - left) / MAP_SIDE)
+    draw_attribution(figure.axes[-1], attribution)
     _write_around(figure, frame, sensors)
-    return figure
+    save_png(path, figure)
 
 
-def _draw_points(axes: Axes, points: NDArray[np.float32], colour: Float) -> None:
+def _draw_points(axes: Axes, points: NDArray[np.float32], colour: NDArray[np.float32]) -> None:
     """Paint points as pixels, the highest last: one picture is smaller and faster than a mark for each point."""
     (left, right), (bottom, top) = axes.get_xlim(), axes.get_ylim()
     shape = (round(PIXELS * (top - bottom) / (right - left)), PIXELS)
@@ -90,17 +81,14 @@ def _draw_points(axes: Axes, points: NDArray[np.float32], colour: Float) -> None
 
 def _draw_boxes(axes: Axes, labels: Labels) -> None:
     """Draw each box in plan with a line from its middle to its front; those without returns in another colour."""
-    forward = np.stack([np.cos(labels.yaw), np.sin(labels.yaw)], axis=1) * labels.size[:, :1] / 2
-    left = np.stack([-np.sin(labels.yaw), np.cos(labels.yaw)], axis=1) * labels.size[:, 1:2] / 2
-    middle = labels.centre[:, :2]
-    corners = np.stack([middle + a * forward + b * left for a, b in ((1, 1), (-1, 1), (-1, -1), (1, -1))], axis=1)
-    noses = np.stack([middle, middle + forward], axis=1)
+    corners = box_corners(np.column_stack([labels.centre[:, :2], labels.size[:, :2], labels.yaw]))
+    noses = np.stack([labels.centre[:, :2], corners[:, [0, 3]].mean(axis=1)], axis=1)
     edge = np.where(labels.points.sum(axis=1) > 0, SEEN_COLOUR, UNSEEN_COLOUR)
     for shapes, closed in ((corners, True), (noses, False)):
         draw_polygons(axes, shapes, closed=closed, facecolors="none", edgecolors=edge, linewidths=0.8)
 
 
-def _draw_sensors(axes: Axes, sensors: Sequence[MountedSensor], colours: Float) -> None:
+def _draw_sensors(axes: Axes, sensors: Sequence[MountedSensor], colours: Sequence[str]) -> None:
     for sensor, colour in zip(sensors, colours, strict=True):
         axes.plot(*sensor.xyz[:2], marker="o", **SENSOR_MARK | {"mfc": colour, "mec": INK, "markersize": 8.0})
         place = (float(sensor.xyz[0]), float(sensor.xyz[1]))
@@ -125,7 +113,7 @@ def _write_around(figure: Figure, frame: Frame, sensors: Sequence[MountedSensor]
     for text in legend.get_texts():
         text.set_parse_math(False)
     bar = figure.add_axes(((2 * MARGIN + MAP_SIDE) / width, 0.3 / height, 3.0 / width, 0.12 / height))
-    bar.imshow(np.linspace(0, 1, 256)[None], cmap=INTENSITY_CMAP, aspect="auto", extent=(0, 1, 0, 1))
+    bar.imshow(strength_ramp(np.linspace(0.0, 1.0, 256))[None], aspect="auto", extent=(0, 1, 0, 1))
     shares = np.array([0.0, 0.05, 0.25, 1.0])
     words = [*(f"{share * MAX_INTENSITY:g}" for share in shares[:-1]), f"{MAX_INTENSITY:g} and more"]
     bar.set(yticks=(), xticks=np.sqrt(shares))

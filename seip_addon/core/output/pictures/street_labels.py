@@ -7,7 +7,7 @@ import numpy as np
 
 from ...arrays import Float
 from ...geometry.map_view import MapView
-from ...world.openstreetmap.street_plan import NamePlaces
+from ...world.street_plan import NamePlaces
 
 MOST_LABELS = 60
 MOST_TRIED = 600

@@ -8,9 +8,9 @@ import numpy as np
 from matplotlib.colors import ListedColormap
 
 from ...arrays import Float
-from ..pictures.drawing import as_png, draw_attribution, draw_callouts, new_page
+from ..pictures.chart_style import new_figure, style_axes
+from ..pictures.drawing import Style, as_png, draw_attribution, draw_callouts, new_page
 from ..pictures.palette import INK, PAPER, SEEN_COLOURS, SOFT_INK
-from ..pictures.plan_style import Style
 from ..pictures.scale_bar import draw_north, draw_scale, north_paper, scale_paper
 from .blind_spots import BlindSpot
 from .evidence import Evidence
@@ -111,8 +111,7 @@ def front_chart(
         Upper end of the axis.
     """
     counts, values, more = zip(*rows, strict=True)
-    figure = new_page(CHART_SIZE, DPI, layout="constrained")
-    axes = figure.add_subplot()
+    figure, (axes,) = new_figure(*CHART_SIZE, dpi=DPI)
     style: Style = {"color": SEEN_COLOURS[2], "ecolor": SOFT_INK, "capsize": 4, "markersize": 8}
     axes.errorbar(counts, values, yerr=np.array([np.zeros(len(more)), more]), marker="o", linewidth=1.6, **style)
     for place in zip(counts, values, strict=True) if len(counts) <= MOST_LABELLED else ():
@@ -120,14 +119,10 @@ def front_chart(
         axes.annotate(text(place[1]), place, **about)
     ring: Style = {"markersize": 17, "mfc": "none", "mec": INK, "mew": 1.8, "linestyle": "none"}
     axes.plot(*placed, marker="o", label="this placement", **ring)
-    axes.set_xlabel("number of sensors", size=11)
-    axes.set_ylabel(label, size=11)
+    style_axes(axes, "number of sensors", label, size=11)
     axes.set_xticks(counts)
-    axes.tick_params(labelsize=10)
     low = min(values)
     axes.set_ylim(low - max(0.04 * high, 0.2 * (high - low)), high + max(0.01 * high, 0.06 * (high - low)))
     axes.margins(x=0.08)
-    axes.grid(visible=True, color="#d8dde1", linewidth=0.6)
-    axes.spines[["top", "right"]].set_visible(False)
     axes.legend(frameon=False, loc="lower right", fontsize=10)
     return as_png(figure)

@@ -49,8 +49,10 @@ code { display: block; background: #eef1f3; padding: .6em .8em; overflow-wrap: a
 }
 @media print {
   body { font-size: 9.5pt; margin: 0; max-width: none; padding: 0; }
-  figure > img { max-height: 21cm; }
-  header figure > img { max-height: 11cm; }
+  figure > img { max-height: 14cm; }
+  figure.tall > img { max-height: 21cm; }
+  dl { break-inside: avoid; }
+  header figure > img { max-height: 9.5cm; }
   section:first-of-type { break-before: page; }
 }
 """
@@ -58,27 +60,27 @@ code { display: block; background: #eef1f3; padding: .6em .8em; overflow-wrap: a
 
 def as_html(report: Report) -> str:
     """Return the page."""
-    title = escape(report.title)
     sections = "\n".join(
         f"<section>\n<h2>{escape(section.title)}</h2>\n{_blocks(section.blocks)}\n</section>"
         for section in report.sections
     )
+    header = f'<h1>{escape(report.title)}</h1>\n<p class="subtitle">{escape(report.subtitle)}</p>'
+    return page(report.title, f"<header>\n{header}\n{_blocks(report.first)}\n</header>\n{sections}")
+
+
+def page(title: str, body: str, style: str = "") -> str:
+    """Return a page that loads nothing, with the style of reports and more."""
     return f"""<!DOCTYPE html>
 <html lang="en">
 <head>
 <meta charset="utf-8">
 <meta http-equiv="Content-Security-Policy" content="{escape(POLICY)}">
 <meta name="viewport" content="width=device-width, initial-scale=1">
-<title>{title}</title>
-<style>{STYLE}</style>
+<title>{escape(title)}</title>
+<style>{STYLE}{style}</style>
 </head>
 <body>
-<header>
-<h1>{title}</h1>
-<p class="subtitle">{escape(report.subtitle)}</p>
-{_blocks(report.first)}
-</header>
-{sections}
+{body}
 </body>
 </html>
 """
@@ -109,7 +111,9 @@ def _facts(facts: Facts) -> str:
 
 def _figure(block: Picture | Pictures) -> str:
     if isinstance(block, Picture):
-        return f"<figure>{_image(block.png, block.caption)}<figcaption>{escape(block.caption)}</figcaption></figure>"
+        kind = ' class="tall"' if block.tall else ""
+        caption = f"<figcaption>{escape(block.caption)}</figcaption>"
+        return f"<figure{kind}>{_image(block.png, block.caption)}{caption}</figure>"
     images = "".join(_image(png, block.about) for png in block.pngs)
     return f'<figure><div class="pair">{images}</div></figure>'
 

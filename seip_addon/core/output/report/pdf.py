@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import logging
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from datetime import datetime
 from pathlib import Path
 from typing import cast
@@ -21,9 +21,14 @@ MARGIN, TOP, BOTTOM = 50.0, 52.0, 56.0
 BODY, SMALL, CARD_TITLE, LARGE, HEADING, TITLE = 9.5, 8.0, 10.5, 10.5, 14.0, 20.0
 LEADING = 1.4  # height of a line, in sizes of the type
 GAP = 7.0  # between blocks
-FIRST_PICTURE_HEIGHT, MAX_PICTURE_HEIGHT, FULL_PAGE_HEIGHT = 400.0, 400.0, 620.0
-CARD_PICTURE_HEIGHT = 178.0
-HEADING_ROOM = 90.0  # room required below the top of a heading, so that it does not end a page
+FIRST_PICTURE_HEIGHTS = (400.0, 350.0, 300.0, 250.0, 200.0)
+"""Heights of the picture on the first page: the largest with which all of it is on one page."""
+MAX_PICTURE_HEIGHT, FULL_PAGE_HEIGHT = 400.0, 620.0
+LEAST_SHARE = 0.65
+"""Share of its size to which a picture is reduced to fit on a page; if that is not enough, what follows comes first."""
+CARD_PICTURE_HEIGHT = 145.0  # two cards fit on a page below a heading
+HEADING_ROOM, TABLE_ROOM = 90.0, 50.0  # below the top of a heading, and of a table, so that they do not end a page
+MOST_TOGETHER = 12  # rows of a table that stay on one page
 RULE, SHADE = "#c9d1d7", "#eef1f3"
 BULLET_INDENT, CELL_PADDING = 12.0, 3.0
 CODE_PADDING = 6
@@ -42,11 +47,12 @@ def as_pdf(report: Report) -> bytes:
     pdf = _Document(report.title)
     pdf.set_creation_date(datetime.fromisoformat(report.created) if report.created else None)
     pdf.add_page()
-    pdf.text_lines(report.title, TITLE, style="B")
-    pdf.text_lines(report.subtitle, HEADING - 2.0, color=SOFT_INK)
-    for block in report.first:
-        pdf.ln(GAP)
-        _add_block(pdf, block, FIRST_PICTURE_HEIGHT)
+    for highest in FIRST_PICTURE_HEIGHTS:
+        with pdf.offset_rendering() as trial:
+            _add_first(cast("_Document", trial), report, highest)
+        if not trial.page_break_triggered:
+            break
+    _add_first(pdf, report, highest)
     for number, section in enumerate(report.sections):
         if number == 0:
             pdf.add_page()
@@ -103,6 +109,17 @@ class _Document(FPDF):
             self.add_page()
 
 
+def _add_first(pdf: _Document, report: Report, highest: float) -> None:
+    pdf.text_lines(report.title, TITLE, style="B")
+    pdf.text_lines(report.subtitle, HEADING - 2.0, color=SOFT_INK)
+    for block in report.first:
+        pdf.ln(GAP)
+        if isinstance(block, Facts):
+            _add_facts(pdf, block)
+        else:
+            _add_block(pdf, block, highest)
+
+
 def _add_section(pdf: _Document, section: Section) -> None:
     pdf.ln(2 * GAP)
     pdf.need(HEADING_ROOM)
@@ -111,9 +128,19 @@ def _add_section(pdf: _Document, section: Section) -> None:
     if pdf.y > TOP:
         pdf.line(MARGIN, pdf.y - GAP, pdf.w - MARGIN, pdf.y - GAP)
     pdf.text_lines(section.title, HEADING, style="B")
+    waiting: list[Picture] = []  # that the rest of the page has no room for
     for block in section.blocks:
+        if isinstance(block, Picture):
+            waiting.append(block)
+        else:
+            pdf.ln(GAP)
+            _add_block(pdf, block)
+        while waiting and _has_room(pdf, waiting[0]):
+            pdf.ln(GAP)
+            _add_block(pdf, waiting.pop(0))
+    for picture in waiting:
         pdf.ln(GAP)
-        _add_block(pdf, block)
+        _add_block(pdf, picture)
 
 
 def _add_block(pdf: _Document, block: Block, highest: float = MAX_PICTURE_HEIGHT) -> None:
@@ -136,24 +163,30 @@ def _add_block(pdf: _Document, block: Block, highest: float = MAX_PICTURE_HEIGHT
         )
         pdf.set_fill_color(PAPER)
     elif isinstance(block, Facts):
-        _add_facts(pdf, block)
+        _add_whole(pdf, lambda page: _add_facts(page, block))
     elif isinstance(block, Card):
-        _add_card(pdf, block)
+        _add_whole(pdf, lambda page: _add_card(page, block))
     elif isinstance(block, Pictures):
         _add_pictures(pdf, block.pngs, "", CARD_PICTURE_HEIGHT)
     elif isinstance(block, Picture):
         _add_pictures(pdf, (block.png,), block.caption, FULL_PAGE_HEIGHT if block.tall else highest)
+    elif len(block.rows) <= MOST_TOGETHER:
+        _add_whole(pdf, lambda page: _add_table(page, block))
     else:
         _add_table(pdf, block)
 
 
 def _add_pictures(pdf: _Document, pngs: Sequence[bytes], caption: str, highest: float) -> None:
-    """Add pictures of one size side by side."""
+    """Add pictures of one size side by side, reduced if they then fit on the page."""
     images = [Image.open(io.BytesIO(png)).convert("RGB") for png in pngs]
     room = (pdf.epw - (len(images) - 1) * GAP) / len(images)
-    width = min(room, highest * images[0].width / images[0].height)
-    height = width * images[0].height / images[0].width
-    pdf.need(height + (3 * SMALL * LEADING if caption else 0.0))
+    below = 3 * SMALL * LEADING if caption else 0.0
+    height = min(highest, room * images[0].height / images[0].width)
+    left_over = pdf.page_break_trigger - pdf.y - below - 1.0
+    if LEAST_SHARE * height <= left_over:
+        height = min(height, left_over)
+    width = height * images[0].width / images[0].height
+    pdf.need(height + below)
     top = pdf.y
     pdf.set_draw_color(RULE)
     for number, image in enumerate(images):
@@ -163,6 +196,23 @@ def _add_pictures(pdf: _Document, pngs: Sequence[bytes], caption: str, highest: 
     pdf.set_y(top + height + 4.0)
     if caption:
         pdf.text_lines(caption, SMALL, color=SOFT_INK)
+
+
+def _has_room(pdf: _Document, picture: Picture) -> bool:
+    """Return whether a picture fits on the page, reduced if need be."""
+    with pdf.offset_rendering() as trial:
+        cast("_Document", trial).ln(GAP)
+        _add_block(cast("_Document", trial), picture)
+    return not trial.page_break_triggered
+
+
+def _add_whole(pdf: _Document, add: Callable[[_Document], None]) -> None:
+    """Add something on one page if it fits on one."""
+    with pdf.offset_rendering() as trial:
+        add(cast("_Document", trial))  # records the same calls
+    if trial.page_break_triggered:
+        pdf.add_page()
+    add(pdf)
 
 
 def _add_facts(pdf: _Document, facts: Facts) -> None:
@@ -185,27 +235,19 @@ def _add_facts(pdf: _Document, facts: Facts) -> None:
 
 
 def _add_card(pdf: _Document, card: Card) -> None:
-    """Add something with a heading of its own, on one page if it fits."""
-    with pdf.offset_rendering() as trial:
-        _fill_card(cast("_Document", trial), card)  # records the same calls
-    if trial.page_break_triggered:
-        pdf.add_page()
-    _fill_card(pdf, card)
-
-
-def _fill_card(pdf: _Document, card: Card) -> None:
     pdf.ln(GAP / 2)
     pdf.rule()
     pdf.text_lines(card.title, CARD_TITLE, style="B")
     for block in card.blocks:
         pdf.ln(4.0)
-        if isinstance(block, Pictures):
-            _add_pictures(pdf, block.pngs, "", CARD_PICTURE_HEIGHT)
+        if isinstance(block, Facts):
+            _add_facts(pdf, block)
         else:
             _add_block(pdf, block)
 
 
 def _add_table(pdf: _Document, table: Table) -> None:
+    pdf.need(TABLE_ROOM)
     pdf.set_font(TEXT, "", SMALL)
     pdf.set_text_color(INK)
     pdf.set_draw_color(RULE)

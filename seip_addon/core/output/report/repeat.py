@@ -15,8 +15,7 @@ from ...settings import Setting, settings_of
 from ...site.candidates import CandidateSettings
 from ...site.installed_cost import load_installed_cost
 from ...storage.json_dataclass import as_json
-from ..results.placement_record import PlacementRecord
-from ..results.recorded_settings import RecordedSettings
+from ..results.placement_record import PlacementRecord, RecordedSettings
 
 
 def repeating_command(record: PlacementRecord) -> str:

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -17,7 +16,6 @@ from ...choosing.placement.returns_summary import (
     FEW_RETURNS,
     NOT_BY_DETECTION,
     SURFACE_SEEN,
-    ReturnsSummary,
     returns_text,
 )
 from ...counts import counted
@@ -27,7 +25,7 @@ from ..results.answer import sentence
 from ..results.costs import Costs, costs_of
 from ..results.file_names import POSE_ERROR_PICTURES, TRAFFIC_PICTURES
 from ..results.located import LOCATED_FILES
-from ..results.placement_record import PlacementRecord, RecordedSensor, relevant_warnings
+from ..results.placement_record import RecordedSensor, relevant_warnings
 from ..results.verification_record import RecordedChange
 from ..results.verification_text import (
     LEAST_COST,
@@ -48,58 +46,24 @@ from .evidence import Evidence
 from .figures import blind_spot_map, front_chart
 from .repeat import repeating_command
 from .wording import (
+    altitude_zero,
     date,
     dollars,
     geographic,
     in_sentence,
     limits_of,
     mounting,
+    named,
     plain_warning,
     points,
     proof,
+    returns_within,
 )
-
-
-@dataclass(frozen=True)
-class Failures:
-    """Share of the targets that is still seen when each sensor fails.
-
-    Parameters
-    ----------
-    left : tuple of float
-        In the order of the sensors.
-    """
-
-    left: tuple[float, ...]
-
-    @property
-    def worst(self) -> float:
-        """Coverage after the worst failure."""
-        return min(self.left)
-
-    @property
-    def mean(self) -> float:
-        """Mean coverage over the failures of each sensor."""
-        return sum(self.left) / len(self.left)
-
-
-def failures(seen: Boolean) -> Failures | None:
-    """Return what is left when a sensor fails, None where there is none.
-
-    Parameters
-    ----------
-    seen : (k, t) bool
-        What each sensor sees.
-    """
-    if not len(seen):
-        return None
-    times = seen.sum(axis=0)
-    return Failures(tuple(float(np.count_nonzero(times - row > 0)) / seen.shape[1] for row in seen))
-
 
 MOST_SPOTS = 8
 LEAST_TILT = 0.05  # degrees, below which a sensor is upright
 MIN_DIFFERENCE = 1e-6  # share of the road by which two coverages differ at least; records have nine digits
+FOR_RETURNS = " for returns from road users"
 POSE_ERRORS = "with errors of"
 """How the note begins that says what pose errors cost."""
 CAPTIONS = {
@@ -209,19 +173,20 @@ def _summary(evidence: Evidence) -> str:
         parts += filter(None, [record.returns.verdict()])
         of_each = record.returns.of_each
         named = [f"{returns_text(number)} points on a {name}" for name, number in of_each.items()]
+        measure = "it typically measures" if len(record.sensors) == 1 else "they typically measure"
         parts.append(
-            f"In each revolution they typically measure {', '.join(named[:-1])} and {named[-1]}, with an allowance "
-            "for traffic in between."
+            f"In each revolution {measure} {', '.join(named[:-1])} and {named[-1]}, with an allowance for traffic in "
+            "between."
         )
     least = min(record.crossings, key=lambda one: one.least, default=None)
     if least is not None:
         parts.append(
-            f"A pedestrian in plain view on a crossing receives at least {returns_text(least.least)} points in each "
+            f"A pedestrian in plain view on a crossing returns at least {returns_text(least.least)} points in each "
             f"revolution (at the worst point of the {in_sentence(least.name)})."
         )
-    failed = failures(evidence.site.seen)
-    if failed is not None and len(record.sensors) > 1:
-        parts.append(f"If any one sensor fails, at least {percent(failed.worst)} of the road is still seen.")
+    if len(record.sensors) > 1:
+        least_left = percent(min(after_failures(evidence.site.seen)))
+        parts.append(f"If any one sensor fails, at least {least_left} of the road is still seen.")
     parts.append(proof(evidence))
     return " ".join(parts)
 
@@ -324,8 +289,8 @@ def _sensors(evidence: Evidence, costs: Costs) -> Iterator[Block]:
     system = (
         f"There are no latitudes and longitudes: {obstacle}."
         if obstacle
-        else f"Eastings and northings are coordinates of the projection “{_projection(evidence)}”; latitudes and "
-        "longitudes are on WGS 84."
+        else f"Eastings and northings are coordinates of {_projection(evidence)}; latitudes and longitudes are on "
+        f"WGS 84; altitudes count from {altitude_zero(evidence)}."
     )
     yield Paragraph(
         "Heights and coordinates are those of the optical centre. On the plans north is up, and small circles are "
@@ -355,7 +320,7 @@ def _sensor_facts(evidence: Evidence, sensor: RecordedSensor, items: Mapping[str
     yield from _coordinates(sensor)
     parts = ", ".join(f"{name} {dollars(amount)}" for name, amount in items.items())
     yield "Cost", f"{dollars(sum(items.values()))}: {parts}"
-    alone = f"; {percent(sensor.coverage_marginal)} no other sensor sees" if len(evidence.sensors) > 1 else ""
+    alone = f"; {percent(sensor.coverage_marginal)} is seen by no other" if len(evidence.sensors) > 1 else ""
     yield "Sees", f"{percent(sensor.coverage_alone)} of the road{alone}"
 
 
@@ -368,12 +333,13 @@ def _coordinates(sensor: RecordedSensor) -> Iterator[tuple[str, str]]:
     if sensor.latitude_deg is not None and sensor.longitude_deg is not None:
         yield "Latitude, longitude", f"{sensor.latitude_deg:.6f}°, {sensor.longitude_deg:.6f}°"
     if sensor.altitude_m is not None:
-        yield "Altitude", f"{sensor.altitude_m:.1f} m above the zero of the map's heights"
+        yield "Altitude", f"{sensor.altitude_m:.1f} m"
 
 
 def _projection(evidence: Evidence) -> str:
-    known = evidence.record.site.geo_reference
-    return "" if known is None else known.projection
+    mercator = evidence.geo_reference.mercator
+    zone = "" if mercator is None else mercator.zone
+    return f"UTM zone {zone}" if zone else f"the projection “{evidence.geo_reference.projection}”"
 
 
 def _costs(costs: Costs) -> Iterator[Block]:
@@ -395,7 +361,7 @@ def _places(evidence: Evidence) -> Iterator[Block]:
     site, returns = evidence.site, {one.name: one.least for one in record.crossings}
     parts = seen_streets(site.targets, evidence.seen_by, [one for one in site.areas if one.name not in returns])
     streets = ((one.name, f"{one.area:,.0f}", percent(one.seen), percent(one.seen_twice)) for one in parts)
-    yield Table(("Street", "Area, m²", "Seen", "Twice"), tuple(streets), frozenset({1, 2, 3}))
+    yield Table(("Part of the road", "Area, m²", "Seen", "Twice"), tuple(streets), frozenset({1, 2, 3}))
     places = seen_places(site.targets, evidence.seen_by, [one for one in site.areas if one.name in returns])
     crossings = tuple((one.name, percent(one.seen), returns_text(returns[one.name])) for one in places)
     if crossings:
@@ -464,16 +430,14 @@ def _other_choices(evidence: Evidence) -> Iterator[Block]:
     yield Paragraph(proof(evidence))
     same_price = _same_price(evidence)
     elsewhere = (POSE_ERRORS, CHOSEN_FOR, BAND, UNRANKED, FEW, *LOCATED_FILES, *([SAME_PRICE] if same_price else []))
-    notes = [sentence(note) for note in record.notes if not note.startswith(elsewhere)]
+    notes = [sentence(note.partition(": the gap is")[0]) for note in record.notes if not note.startswith(elsewhere)]
     notes += [same_price] if same_price else []
     notes += [] if record.judgement is None else record.judgement.sentences()
     if record.returns is not None and record.judgement is None:
         notes.append(sentence(NOT_BY_DETECTION))
     notes.append("“Proven” refers to the model: this scene, these sensor models and this criterion.")
     yield Bullets(tuple(notes))
-    if record.returns is not None and record.returns.front:
-        yield from _returns_front(record, record.returns)
-    elif record.front:
+    if len(record.front if record.returns is None else record.returns.front) > 1:
         yield from _front(evidence)
 
 
@@ -499,91 +463,74 @@ def _weighted_share(evidence: Evidence) -> float:
 
 
 def _front(evidence: Evidence) -> Iterator[Block]:
-    record = evidence.record
-    weighted = " Coverage is weighted here." if np.ptp(evidence.site.problem.weights) > 0 else ""
+    """Yield the chart and the table of the best placements by number of sensors."""
+    record, returns, budget = evidence.record, evidence.record.returns, evidence.record.request.goal.budget
+    text: Callable[[float], str] = _percent if returns is None else returns_text
+    if returns is None:
+        rows = [
+            (point.count, 100 * point.coverage, 100 * point.missed, point.price, _others_see(point.missed))
+            for point in record.front
+        ]
+        weighted = " Coverage is weighted here." if np.ptp(evidence.site.problem.weights) > 0 else ""
+        measured, head, own = f"see:{weighted}", "Seen", 100 * _weighted_share(evidence)
+        label, highest = "road seen, %", 100.0
+    else:
+        rows = []
+        for point in returns.front:
+            more = (1.0 + point.returns) * (point.gap or 0.0)  # gaps are shares of 1 + returns
+            rows.append((point.count, point.returns, more, point.price, _others_have(point.returns, point.gap)))
+        measured = "typically measure these numbers of points on a road user in each revolution."
+        head, own, label = "Points", returns.typical, "typical points on a road user"
+        highest = max(value + more for _, value, more, *_ in rows)
+    limit = "" if budget is None else f" The budget of {dollars(budget)} does not limit the choices of this table."
     yield Paragraph(
         "With fewer or more sensors under the same rules, regardless of price, the best choices found by a short "
-        f"search see:{weighted}{_without_budget(record)}"
+        f"search {measured}{limit}"
     )
-    yield Picture(
-        front_chart(
-            [(point.count, 100 * point.coverage, 100 * point.missed) for point in record.front],
-            (len(record.sensors), 100 * _weighted_share(evidence)),
-            "road seen, %",
-            "{:.1f}%".format,
-            100.0,
-        ),
-        "Road seen by number of sensors; a line above a point extends to what no choice can exceed.",
+    chart = front_chart([row[:3] for row in rows], (len(record.sensors), own), label, text, highest)
+    what = f"{label[:1].upper()}{label[1:].removesuffix(', %')} by number of sensors"
+    yield Picture(chart, f"{what}; a line above a point extends to what no choice can exceed, where that is proven.")
+    yield Table(
+        ("Sensors", "Price installed, $" if record.installed else "Price, $", head, "Other choices"),
+        tuple((str(count), f"{price:,.0f}", text(value), words) for count, value, _, price, words in rows),
+        frozenset({0, 1, 2}),
     )
-    rows = tuple(
-        (
-            str(point.count),
-            f"{point.price:,.0f}",
-            percent(point.coverage),
-            "none sees more" if point.missed == 0 else f"at most {points(point.missed)} more",
-        )
-        for point in record.front
-    )
-    yield Table(("Sensors", _price_head(record), "Seen", "Other choices"), rows, frozenset({0, 1, 2}))
 
 
-def _returns_front(record: PlacementRecord, returns: ReturnsSummary) -> Iterator[Block]:
-    """Return the table of numbers of sensors of a placement that was chosen for returns."""
-    # Gaps are shares of 1 + returns.
-    charted = [(one.count, one.returns, (1.0 + one.returns) * (one.gap or 0.0)) for one in returns.front]
-    yield Paragraph(
-        "With fewer or more sensors under the same rules, regardless of price, the best choices found by a short "
-        "search typically measure these numbers of points on a road user in each revolution; shares in the last "
-        f"column are of 1 + points.{_without_budget(record)}"
-    )
-    yield Picture(
-        front_chart(
-            charted,
-            (len(record.sensors), returns.typical),
-            "typical points on a road user",
-            returns_text,
-            max(value + more for _, value, more in charted),
-        ),
-        "Typical points on a road user by number of sensors; where there is a proof, a line above a point extends to "
-        "what no choice can exceed.",
-    )
-    rows = tuple(
-        (str(point.count), f"{point.price:,.0f}", returns_text(point.returns), _others_have(point.gap))
-        for point in returns.front
-    )
-    yield Table(("Sensors", _price_head(record), "Points", "Other choices"), rows, frozenset({0, 1, 2}))
+def _others_see(missed: float) -> str:
+    return f"at most {points(missed)} more" if missed else "none sees more"
 
 
-def _others_have(gap: float | None) -> str:
-    """Return how many more returns other choices of a number of sensors can have, as text."""
+def _percent(value: float) -> str:
+    return percent(value / 100)
+
+
+def _others_have(returns: float, gap: float | None) -> str:
+    """Return how many returns other choices of a number of sensors can have, as text."""
     if gap is None:
         return "may have more"
-    return f"at most {math.ceil(gap * 1000 - 1e-9) / 10:.1f}% more" if gap else "none has more"
+    return f"none has more than {returns_within(returns, gap)}" if gap else "none has more"
 
 
-def _without_budget(record: PlacementRecord) -> str:
-    budget = record.request.goal.budget
-    return "" if budget is None else f" The budget of {dollars(budget)} does not limit the choices of this table."
-
-
-def _price_head(record: PlacementRecord) -> str:
-    return "Installed, $" if record.installed else "Sensors, $"
+def after_failures(seen: Boolean) -> list[float]:
+    """Return the share of the targets that is still seen when each sensor fails, from what each sees, (k, t)."""
+    times = seen.sum(axis=0)
+    return [float(np.count_nonzero(times - row > 0)) / seen.shape[1] for row in seen]
 
 
 def _losses(evidence: Evidence) -> Iterator[Block]:
     record = evidence.record
-    failed = failures(evidence.site.seen)
-    if failed is not None:
-        worst = record.sensors[failed.left.index(failed.worst)].id
-        yield Paragraph(
-            f"After the failure of one sensor, {percent(failed.mean)} of the road is still seen on average, and "
-            f"{percent(failed.worst)} in the worst case, the failure of {worst}."
-        )
+    left = after_failures(evidence.site.seen)
+    if len(left) > 1:
+        worst = record.sensors[left.index(min(left))].id
+        seen, least = percent(sum(left) / len(left)), percent(min(left))
+        worse = f" on average, and {least} in the worst case, the failure of {worst}" if seen != least else ""
+        yield Paragraph(f"After the failure of one sensor, {seen} of the road is still seen{worse}.")
         yield Table(
             ("Failed", "Still seen", "Lost"),
             tuple(
-                (sensor.id, percent(left), percent(max(0.0, record.coverage.whole - left)))
-                for sensor, left in zip(record.sensors, failed.left, strict=True)
+                (sensor.id, percent(share), percent(max(0.0, record.coverage.whole - share)))
+                for sensor, share in zip(record.sensors, left, strict=True)
             ),
             frozenset({1, 2}),
         )
@@ -611,7 +558,7 @@ def _trust(evidence: Evidence) -> Iterator[Block]:
         lines.append(f"Types 1 to 3 {PAPER_MODELS} This placement uses {' and '.join(models)}.")
     evidences = {sensor.sensor_name: sensor.evidence for sensor in record.sensors if sensor.sensor not in PAPER_TYPES}
     lines += [f"Range of {name}: {rests_on}." for name, rests_on in evidences.items() if rests_on]
-    lines += [sentence(note) for note in record.notes if note.startswith((BAND, UNRANKED))]
+    lines += [named(sentence(note)) for note in record.notes if note.startswith((BAND, UNRANKED))]
     chosen = (sensor.sensor for sensor in record.sensors)
     warnings = relevant_warnings(record.warnings, record.request.candidates.sensors, chosen)
     lines += [plain_warning(warning, names) for warning in warnings]
@@ -635,7 +582,9 @@ def _sources(evidence: Evidence) -> Iterator[Block]:
     lines.append(f"Program: SEIP for Blender {version}, GPL-3.0-or-later.".replace("  ", " "))
     yield Bullets(tuple(lines))
     if record.site.sources:
-        yield Paragraph("Where the objects of the scene come from, and for how many position or size is assumed:")
+        yield Paragraph(
+            "Where the objects of the scene come from, and for how many of them position or size is assumed:"
+        )
         rows = tuple(
             (row.kind, row.source, f"{row.count:,}", f"{row.assumed:,}" if row.assumed else "none")
             for row in record.site.sources
@@ -667,6 +616,7 @@ def _settings(evidence: Evidence) -> Iterator[tuple[str, str]]:
         what = "most of the road seen" if record.returns is None else "most points on road users"
         asked = f"{what}{limits_of(goal, 'with')}"
     chosen_for = purpose(record.notes)
+    chosen_for = "" if record.returns is not None and chosen_for == FOR_RETURNS else chosen_for
     yield "Asked for", f"{asked}{f', chosen{chosen_for}' if chosen_for else ''}"
     rules = ["the road in weighted regions counts more"] if goal.central_weight is not None else []
     rules += [f"sensors at least {goal.min_distance:g} m apart"] if goal.min_distance > 0 else []

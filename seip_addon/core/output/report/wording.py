@@ -7,12 +7,16 @@ import re
 from collections.abc import Mapping
 from datetime import datetime
 
-from ...choosing.placement.objective import CHOSEN_FOR, MOVED, MOVED_MESSAGE, Objective, certificate
+from ...choosing.placement.objective import CHOSEN_FOR, MOVED, MOVED_MESSAGE, Objective
 from ...counts import counted
-from ..results.answer import sentence
-from ..results.placement_record import RecordedObjective, RecordedSensor
+from ...sensing.lidar.catalogue import load_catalogue
+from ...site.scene_geometry import FROM_EXTRACT, HEIGHTS_FROM
+from ..results.answer import possible_improvement, sentence
+from ..results.placement_record import RecordedSensor
 from .evidence import Evidence
 
+LEVEL = 0.5  # metres between the road at the origin and zero in a model without heights
+ROADS = "Driving lanes"
 _RINGS = re.compile(r"beyond (.*?) neighbouring rings on a level road are more than 2δ = ([\d.]+) m apart.*")
 _RANGE = re.compile(r"detects this road \((.*?) reflectivity\) with (.*?) probability up to (.*?)(?:;.*)?$")
 
@@ -27,6 +31,18 @@ def points(share: float) -> str:
     return f"{math.ceil(share * 1000 - 1e-9) / 10:.1f} percentage points"
 
 
+def returns_within(returns: float, gap: float) -> str:
+    """Return a bound on returns as text, rounded up; the gap is the largest share by which 1 + returns can grow."""
+    most = (1.0 + returns) * (1.0 + gap) - 1.0
+    return f"{math.ceil(most - 1e-9):,}" if most >= 10 else f"{math.ceil(10 * most - 1e-9) / 10:.1f}"
+
+
+def named(text: str) -> str:
+    """Return a text with the names of sensor types in place of their catalogue keys."""
+    catalogue = load_catalogue()
+    return re.sub(r"\w+", lambda word: catalogue[word[0]].name if word[0] in catalogue else word[0], text)
+
+
 def date(created: str) -> str:
     """Return the date of a time (ISO 8601), such as 24 November 2026."""
     when = datetime.fromisoformat(created)
@@ -38,6 +54,19 @@ def geographic(latitude: float, longitude: float, digits: int) -> str:
     """Return latitude and longitude in degrees with their hemispheres."""
     north, east = "N" if latitude >= 0 else "S", "E" if longitude >= 0 else "W"
     return f"{abs(latitude):.{digits}f}° {north}, {abs(longitude):.{digits}f}° {east}"
+
+
+def altitude_zero(evidence: Evidence) -> str:
+    """Return the level that altitudes count from, as far as the scene knows it."""
+    site = evidence.record.site
+    file = next((note.removeprefix(HEIGHTS_FROM) for note in site.assumptions if note.startswith(HEIGHTS_FROM)), "")
+    if file:
+        return f"the zero of the heights in {file.rpartition(' to ')[0].rpartition(', ')[0]}"
+    from_extract = any(row.source == FROM_EXTRACT and row.kind == ROADS for row in site.sources)
+    if from_extract and abs(site.origin_m[2]) < LEVEL:
+        return "the ground of the model, which is level, as the extract has no heights above the sea"
+    model = re.search(r"\+geoidgrids=(\S+)", evidence.geo_reference.projection)
+    return f"the zero of the map's heights{f' (geoid {model[1]})' if model else ', whose level the map does not give'}"
 
 
 def in_sentence(name: str) -> str:
@@ -71,33 +100,18 @@ def plain_warning(warning: str, names: Mapping[str, str]) -> str:
     return sentence(f"{names[key]}: {rest}")
 
 
-def certificate_sentence(evidence: Evidence) -> str:
-    """Return the sentence on the proven optimality gap among the same positions."""
-    record = evidence.record
-    found, places = record.objective, record.counts.positions
-    if found.status == MOVED:
-        return MOVED_MESSAGE
-    if any(note.startswith(CHOSEN_FOR) for note in record.notes):
-        return certificate(found.status, found.gap, cheapest=found.cheapest, notes=record.notes)
-    choice = f"choice{limits_of(record.request.goal, 'of')} among the {places:,} positions, under the same rules,"
-    if found.bound is None:
-        return f"Another {choice} may be better; how much better is not known."
-    better = _cheaper(found) if found.cheapest else _more_coverage(evidence)
-    proven = "this is proven" if found.status == "optimal" else "this bound is proven"
-    return f"No other {choice} {better}: {proven}."
-
-
 def proof(evidence: Evidence) -> str:
-    """Return what is proven of a placement, without terms of optimisation."""
+    """Return what is proven of a placement among the same positions, without terms of optimisation."""
     record = evidence.record
     found = record.objective
-    if found.status == MOVED or not any(note.startswith(CHOSEN_FOR) for note in record.notes):
-        return certificate_sentence(evidence)
-    choice = f"choice{limits_of(record.request.goal, 'of')} among the {record.counts.positions:,} possible positions"
-    if found.status == "optimal":
-        return f"No other {choice} does better: this is proven."
-    better = "how much better is not known" if found.gap is None else f"by at most {found.gap:.1%}: this is proven"
-    return f"Another {choice} may do better, {better}."
+    if found.status == MOVED:
+        return MOVED_MESSAGE
+    limits = limits_of(record.request.goal, "of")
+    choice = f"choice{limits} among the {record.counts.positions:,} positions, under the same rules,"
+    if found.bound is None:
+        return f"Another {choice} may be better; how much better is not known."
+    proven = "this is proven" if found.status == "optimal" else "this bound is proven"
+    return f"No other {choice} {_better(evidence, found.bound)}: {proven}."
 
 
 def limits_of(goal: Objective, joint: str) -> str:
@@ -106,16 +120,20 @@ def limits_of(goal: Objective, joint: str) -> str:
     return count if goal.budget is None else f"{count} for at most {dollars(goal.budget)}"
 
 
-def _cheaper(found: RecordedObjective) -> str:
-    if found.status == "optimal" or found.bound is None:
-        return "reaches the required coverage at a lower price"
-    return f"is more than {dollars(max(0.0, found.value - found.bound))} cheaper"
-
-
-def _more_coverage(evidence: Evidence) -> str:
-    found = evidence.record.objective
+def _better(evidence: Evidence, bound: float) -> str:
+    """Return what no other choice does, as the predicate of a sentence."""
+    record, found = evidence.record, evidence.record.objective
+    returns, optimal = record.returns, found.status == "optimal"
+    if any(note.startswith(CHOSEN_FOR) for note in record.notes):
+        more = possible_improvement(record) or 0.0
+        if optimal:
+            return "does better"
+        if returns is not None and math.isclose(math.expm1(found.value), returns.typical, rel_tol=1e-3):
+            return f"has more than {returns_within(returns.typical, more)} points on a typical road user"
+        return f"is better by more than {math.ceil(more * 1000 - 1e-9) / 10:.1f}%"
+    if found.cheapest:
+        saved = f"is more than {dollars(max(0.0, found.value - bound))} cheaper"
+        return "reaches the required coverage at a lower price" if optimal else saved
+    more = max(0.0, bound - found.value) / math.fsum(evidence.site.problem.weights)
     what = "of the road" if found.kind == "vanilla" else "of the road, counted by its weights"
-    if found.status == "optimal" or found.bound is None:
-        return f"covers more {what}"
-    more = max(0.0, found.bound - found.value) / math.fsum(evidence.site.problem.weights)
-    return f"covers more than {points(more)} more {what}"
+    return f"covers more {what}" if optimal else f"covers more than {points(more)} more {what}"

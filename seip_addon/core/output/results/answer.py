@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from ...choosing.placement.objective import MOVED, purpose
+from ...choosing.placement.objective import ACCEPTED_MESSAGE, MOVED, purpose
 from ...choosing.placement.returns_summary import FEW_RETURNS, returns_text, share_reached
 from ...counts import counted
 from .costs import costs_of
@@ -49,7 +49,8 @@ def recommendation(record: PlacementRecord) -> str:
     """Return the most useful next step to a better or cheaper placement, or "" if none stands out."""
     more = possible_improvement(record)
     if more is not None and more >= LARGE_GAP and record.judgement is None:
-        return "Search longer for a better placement: raise the effort."
+        how = "let the search run to its end" if ACCEPTED_MESSAGE in record.notes else "raise the effort"
+        return f"Search longer for a better placement: {how}."
     crossing = min(record.returns.crossings, key=lambda one: one.least, default=None) if record.returns else None
     if crossing is not None and crossing.least < FEW_RETURNS:
         return f"Few returns from pedestrians ({returns_text(crossing.least)}) at {crossing.name}: add a sensor there."
@@ -106,7 +107,7 @@ def _quality(record: PlacementRecord, *, exact: bool = False) -> str:
 
 def _certificate(record: PlacementRecord) -> str:
     if record.objective.status == MOVED:
-        return "moved by hand"
+        return "not optimised"
     if record.objective.status == "optimal":
         return "proven"
     more = possible_improvement(record)
@@ -124,7 +125,7 @@ def _outlook(record: PlacementRecord) -> str:
     """Return how much better the best placement of these candidates could be."""
     objective = record.objective
     if objective.status == MOVED:
-        return "Sensors were moved by hand."
+        return "This is not an optimised placement: the sensors are evaluated where they stand."
     what = purpose(record.notes) if record.returns is None else ""  # else the sentence before has said it
     what += "" if record.judgement is None else " by the criterion"
     better = "cheaper" if objective.cheapest else "better"

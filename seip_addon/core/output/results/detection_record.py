@@ -1,11 +1,9 @@
 """``detection.json``: what a detector finds with the sensors of a placement."""
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from ...errors import SeipError
-from ...storage.json_dataclass import from_json
+from ...storage.json_dataclass import read_record
 
 SCHEMA = "seip-detection/1"
 RECORDING_SCHEMA = "seip-recording/1"
@@ -55,11 +53,4 @@ def parsed_detection(text: str) -> DetectionRecord:
     SeipError
         It is none, or one of another version.
     """
-    try:
-        content = json.loads(text)
-        schema = content.get("schema") if isinstance(content, dict) else None
-        if schema == SCHEMA:
-            return from_json(DetectionRecord, content)
-    except (ValueError, RecursionError) as error:
-        raise SeipError(f"the figures of detection are damaged: {error}; detect again") from error
-    raise SeipError(f"the figures of detection have the schema {schema!r}, not {SCHEMA!r}: use one version of SEIP")
+    return read_record(DetectionRecord, text, SCHEMA, "the record of detection", "detect again")

@@ -3,8 +3,6 @@
 `tests/core/output/results/test_placement_record.py` shows its use.
 """
 
-import json
-import math
 import os
 from functools import lru_cache
 from pathlib import Path
@@ -12,7 +10,7 @@ from typing import Any
 
 from ...errors import SeipError
 from ...storage.files import save_json
-from ...storage.json_dataclass import from_json
+from ...storage.json_dataclass import read_record
 from .placement_record import SCHEMA, PlacementRecord
 
 
@@ -45,7 +43,7 @@ def parsed_record(text: str) -> PlacementRecord:
     SeipError
         It is not a placement of a version that this program can read.
     """
-    return _read(text.encode(), "the placement that this scene keeps")
+    return _read(text, "the placement that this scene keeps")
 
 
 def comparable(record: PlacementRecord) -> dict[str, Any]:
@@ -53,21 +51,5 @@ def comparable(record: PlacementRecord) -> dict[str, Any]:
     return {key: value for key, value in record.as_json().items() if key not in {"times", "versions"}}
 
 
-def _read(text: bytes, where: str) -> PlacementRecord:
-    try:
-        content = json.loads(text.decode(), parse_float=_finite, parse_constant=_finite)
-        schema = content.get("schema") if isinstance(content, dict) else None
-        if schema == SCHEMA:
-            record = from_json(PlacementRecord, content)
-            _ = record.request, record.text().encode()  # refused if these cannot be read or written again
-            return record
-    except (SeipError, ValueError, RecursionError) as error:
-        raise SeipError(f"{where} is damaged or no placement: {error}; place the sensors again") from error
-    raise SeipError(f"{where} has the schema {schema!r}, not {SCHEMA!r}; place the sensors again with this version")
-
-
-def _finite(text: str) -> float:
-    value = float(text)
-    if not math.isfinite(value):
-        raise ValueError(f"{text} is no finite number")
-    return value
+def _read(text: str | bytes, name: str) -> PlacementRecord:
+    return read_record(PlacementRecord, text, SCHEMA, name, "place the sensors again")

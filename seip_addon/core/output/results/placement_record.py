@@ -6,33 +6,50 @@
 import json
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, fields, is_dataclass, replace
 from datetime import datetime
 from functools import cached_property
-from typing import Any, Literal
+from typing import Any, Literal, TypeVar, cast
 
 import numpy as np
 
 from ...arrays import Float, Integer
-from ...choosing.placement.deployment import GainBand, Sensor, TypeBand, price_text
+from ...choosing.placement.deployment import GainBand, Sensor, price_text
 from ...choosing.placement.judgement import Judgement
-from ...choosing.placement.objective import FrontPoint, Solution
+from ...choosing.placement.objective import FrontPoint, Objective, Solution
 from ...choosing.placement.problem import Placement
-from ...choosing.placement.returns_summary import CrossingReturns, ReturnsPoint, ReturnsSummary, share_reached
+from ...choosing.placement.returns_summary import CrossingReturns, ReturnsSummary, share_reached
+from ...choosing.placement.search_limits import DEFAULT_EFFORT
 from ...geometry.geo_reference import GeoReference
 from ...geometry.orientation import orientation
 from ...sensing.lidar.model import LidarModel
 from ...sensing.scans.sensor import MountedSensor
+from ...sensing.visibility.settings import Engine, VisibilitySettings
+from ...sensing.weather import Weather
+from ...site.candidates import CandidateSettings
+from ...site.installed_cost import InstalledCost
 from ...site.site import Site
 from ...site.sources import SourceCount
 from ...storage.json_dataclass import from_json
 from .headings import degrees, tilt_degrees
-from .recorded_settings import RecordedSettings
 
 Point = tuple[float, float, float]
-MapPoint = tuple[float, float, float]
+
+Value = TypeVar("Value")
 
 SCHEMA = "seip-placement/3"
+SHARE_DIGITS = 9
+DIGITS: Mapping[str, int | None] = {
+    **dict.fromkeys(("price_usd", "installation_usd", "price"), 2),  # dollars
+    **dict.fromkeys(("typical", "of_each", "least", "returns"), 3),  # returns, to what single precision holds
+    **dict.fromkeys(("easting_m", "northing_m", "durations_s"), 3),
+    # The micrometre hides the last bits in which platforms differ.
+    **dict.fromkeys(("origin_m", "header_offset_m", "local_m", "map_m", "height_m", "altitude_m"), 6),
+    **dict.fromkeys(("latitude_deg", "longitude_deg"), 8),
+    **dict.fromkeys(("yaw_deg", "tilt_deg", "roll_deg", "header_heading_deg"), None),  # see `headings`
+    **dict.fromkeys(("objective", "value", "bound", "settings", "judgement"), None),
+}
+"""Decimal places of what is not a share; None where numbers stay as they are."""
 
 
 @dataclass(frozen=True)
@@ -61,10 +78,10 @@ def relevant_warnings(warnings: Iterable[str], considered: Iterable[str], chosen
 
 @dataclass(frozen=True)
 class RecordedGeoReference:
-    """Georeference of the scene's map; see `GeoReference`."""
+    """Georeference of the scene's map; UTM zones are those of its hemisphere, see `GeoReference.in_hemisphere`."""
 
     projection: str
-    header_offset_m: MapPoint
+    header_offset_m: Point
     header_heading_deg: float
 
     @property
@@ -90,7 +107,7 @@ class RecordedSite:
     """
 
     name: str
-    origin_m: MapPoint
+    origin_m: Point
     geo_reference: RecordedGeoReference | None = None
     sources: tuple[SourceCount, ...] = ()
     attribution: tuple[str, ...] = ()
@@ -112,7 +129,7 @@ class RecordedSensor:
     latitude_deg, longitude_deg, altitude_m : float, optional
         On WGS 84, and the height above the map's zero; None where the map's projection is not known.
     easting_m, northing_m : float, optional
-        Coordinates of the map's projection: map coordinates and the offset of the map's header. None likewise.
+        Coordinates of the record's projection: map coordinates and the offset of its header. None likewise.
     evidence : str
         What its type's law of detection rests on; records of earlier versions lack it.
     installation_usd : float, optional
@@ -130,7 +147,7 @@ class RecordedSensor:
     position: str
     on_pole: bool
     local_m: Point
-    map_m: MapPoint
+    map_m: Point
     height_m: float
     yaw_deg: float
     tilt_deg: float
@@ -224,6 +241,32 @@ class RecordedTimes:
 
 
 @dataclass(frozen=True)
+class RecordedSettings:
+    """Settings of a placement; records of earlier versions may lack all but the objective and the sensor types.
+
+    Parameters
+    ----------
+    goal : Objective
+    catalogue : tuple of str
+        Names of the user's own catalogues, without their folders.
+    render : bool
+        Whether the result includes a rendered view.
+    """
+
+    goal: Objective
+    candidates: CandidateSettings
+    visibility: VisibilitySettings = VisibilitySettings()
+    weather: Weather = Weather()
+    grid_spacing_m: float = 1.0
+    catalogue: tuple[str, ...] = ()
+    engine: Engine = "auto"
+    solver: str = "auto"
+    effort: float = DEFAULT_EFFORT
+    installed_cost: InstalledCost | None = None
+    render: bool = False
+
+
+@dataclass(frozen=True)
 class PlacementRecord:
     """Content of ``placement.json`` without its schema, key by key; see docs/formats.md.
 
@@ -264,6 +307,9 @@ class PlacementRecord:
     front: tuple[FrontPoint, ...] = ()
     crossings: tuple[CrossingReturns, ...] = ()
     judgement: Judgement | None = None
+
+    def __post_init__(self) -> None:
+        _ = self.request  # refuses settings that cannot be read again
 
     @cached_property
     def request(self) -> RecordedSettings:
@@ -334,19 +380,19 @@ def placement_record(
         What the user should know before trusting the figures.
     """
     deployment, placement, greedy = solution.deployment, solution.placement, solution.greedy
-    return PlacementRecord(
+    record = PlacementRecord(
         site=RecordedSite(
-            *(site.name, _metres(site.origin), _geo_reference(site.geo_reference)),
+            *(site.name, _point(site.origin), _geo_reference(site.geo_reference.in_hemisphere(site.origin))),
             *(site.sources, site.attribution, site.assumptions),
         ),
         sensors=tuple(recorded_sensor(sensor, site) for sensor in deployment.sensors),
-        price_usd=_rounded(deployment.price, 2),
+        price_usd=float(deployment.price),
         coverage=RecordedCoverage(
-            whole=_share(deployment.coverage),
-            central=None if deployment.central is None else _share(deployment.central),
-            weighted=_share(deployment.weighted),
-            seen_twice=_share(deployment.seen_twice),
-            gain_band=deployment.gain_band and _rounded_band(deployment.gain_band),
+            whole=deployment.coverage,
+            central=deployment.central,
+            weighted=deployment.weighted,
+            seen_twice=deployment.seen_twice,
+            gain_band=deployment.gain_band,
         ),
         objective=RecordedObjective(
             kind="vanilla" if solution.objective.central_weight is None else "weighted",
@@ -367,13 +413,14 @@ def placement_record(
         versions=dict(provenance.versions),
         times=RecordedTimes(
             provenance.created.isoformat(timespec="seconds"),
-            {step: _rounded(seconds, 3) for step, seconds in provenance.durations.items()},
+            provenance.durations,
         ),
-        returns=deployment.returns and _rounded_returns(deployment.returns),
-        front=tuple(_rounded_point(point) for point in solution.front),
-        crossings=_rounded_crossings(solution.crossings),
+        returns=deployment.returns,
+        front=tuple(solution.front),
+        crossings=tuple(solution.crossings),
         judgement=solution.judgement,
     )
+    return _rounded_parts(record)
 
 
 def _without_absent(items: list[tuple[str, Any]]) -> dict[str, Any]:
@@ -386,9 +433,7 @@ _LEFT_OUT = {"roll_deg", "installation_usd", "returns", "judgement"}  # where th
 def _geo_reference(known: GeoReference) -> RecordedGeoReference | None:
     if not known.projection:
         return None
-    return RecordedGeoReference(
-        known.projection, _metres(np.array(known.header_offset[:3])), tilt_degrees(known.header_offset[3])
-    )
+    return RecordedGeoReference(known.projection, _point(known.header_offset[:3]), tilt_degrees(known.header_offset[3]))
 
 
 def recorded_sensor(sensor: Sensor, site: Site) -> RecordedSensor:
@@ -396,38 +441,35 @@ def recorded_sensor(sensor: Sensor, site: Site) -> RecordedSensor:
     place = site.geographic(sensor.xyz[None])
     longitude, latitude, altitude = (None, None, None) if place is None else place[0]
     map_xyz = sensor.xyz + site.origin
-    easting, northing = (None, None) if place is None else site.geo_reference.projected(map_xyz[None])[0, :2]
-    return RecordedSensor(
+    reference = site.geo_reference.in_hemisphere(site.origin)
+    easting, northing = (None, None) if place is None else reference.projected(map_xyz[None])[0, :2]
+    record = RecordedSensor(
         id=sensor.label,
         pose=sensor.pose,
         sensor=sensor.model.key,
         sensor_name=sensor.model.name,
         position=sensor.position_name,
         on_pole=sensor.on_pole,
-        local_m=_metres(sensor.xyz),
-        map_m=_metres(map_xyz),
-        height_m=_rounded(sensor.height, 6),
+        local_m=_point(sensor.xyz),
+        map_m=_point(map_xyz),
+        height_m=sensor.height,
         yaw_deg=degrees(sensor.yaw),
         tilt_deg=tilt_degrees(sensor.tilt),
-        price_usd=_rounded(sensor.price, 2),
-        coverage_alone=_share(sensor.alone),
-        coverage_added=_share(sensor.added),
-        coverage_marginal=_share(sensor.marginal),
+        price_usd=sensor.price,
+        coverage_alone=sensor.alone,
+        coverage_added=sensor.added,
+        coverage_marginal=sensor.marginal,
         roll_deg=tilt_degrees(sensor.roll) if sensor.pose is None else None,
-        latitude_deg=None if latitude is None else _rounded(latitude, 8),
-        longitude_deg=None if longitude is None else _rounded(longitude, 8),
-        altitude_m=None if altitude is None else _rounded(altitude, 6),
-        easting_m=None if easting is None else _rounded(easting, 3),
-        northing_m=None if northing is None else _rounded(northing, 3),
+        latitude_deg=latitude,
+        longitude_deg=longitude,
+        altitude_m=altitude,
+        easting_m=easting,
+        northing_m=northing,
         evidence=sensor.model.evidence,
         all_round=sensor.model.all_round,
-        installation_usd=None if sensor.installation is None else _rounded(sensor.installation, 2),
+        installation_usd=sensor.installation,
     )
-
-
-def _rounded_band(band: GainBand) -> GainBand:
-    types = tuple(TypeBand(one.sensor, _share(one.low), _share(one.high)) for one in band.types)
-    return replace(band, low=_share(band.low), high=_share(band.high), types=types)
+    return _rounded_parts(record)
 
 
 def _sought(solution: Solution) -> Literal["most coverage", "most returns", "least price"]:
@@ -436,25 +478,22 @@ def _sought(solution: Solution) -> Literal["most coverage", "most returns", "lea
     return "most coverage" if solution.deployment.returns is None else "most returns"
 
 
-def _rounded_returns(returns: ReturnsSummary) -> ReturnsSummary:
-    """Round to what single precision holds."""
-    of_each = {name: _rounded(number, 3) for name, number in returns.of_each.items()}
-    front = tuple(
-        ReturnsPoint(
-            one.count, _rounded(one.returns, 3), _rounded(one.price, 2), None if one.gap is None else _share(one.gap)
-        )
-        for one in returns.front
-    )
-    enough = {name: _share(share) for name, share in returns.enough.items()}
-    return ReturnsSummary(_rounded(returns.typical, 3), of_each, _rounded_crossings(returns.crossings), front, enough)
-
-
-def _rounded_crossings(crossings: Iterable[CrossingReturns]) -> tuple[CrossingReturns, ...]:
-    return tuple(replace(one, least=_rounded(one.least, 3)) for one in crossings)
-
-
-def _rounded_point(point: FrontPoint) -> FrontPoint:
-    return FrontPoint(point.count, _share(point.coverage), _rounded(point.price, 2), _share(point.missed))
+def _rounded_parts(value: Value, digits: int | None = SHARE_DIGITS) -> Value:
+    """Round all numbers in a dataclass, tuple or mapping: shares, or what `DIGITS` has by its name."""
+    rounded: Any = value
+    if digits is None:
+        return value
+    if isinstance(value, float):
+        rounded = round(float(value), digits) + 0.0  # no negative zero
+    elif isinstance(value, tuple):
+        rounded = tuple(_rounded_parts(part, digits) for part in value)
+    elif isinstance(value, Mapping):
+        rounded = {name: _rounded_parts(part, digits) for name, part in value.items()}
+    elif is_dataclass(value) and not isinstance(value, type):
+        own = ((each.name, getattr(value, each.name)) for each in fields(value))
+        parts = {name: _rounded_parts(part, DIGITS.get(name, SHARE_DIGITS)) for name, part in own}
+        rounded = replace(value, **parts)
+    return cast("Value", rounded)
 
 
 def _greedy(greedy: Placement, placement: Placement, *, of_returns: bool) -> RecordedGreedy:
@@ -462,7 +501,7 @@ def _greedy(greedy: Placement, placement: Placement, *, of_returns: bool) -> Rec
         value=_significant(greedy.objective),
         # The better of the two bounds: once the optimum is proven, it no longer depends on a platform's rounding.
         bound=_found(min(greedy.bound, placement.bound)),
-        gap_to_placement=_share(1.0 - share_reached(greedy.objective, placement.objective, of_returns=of_returns)),
+        gap_to_placement=1.0 - share_reached(greedy.objective, placement.objective, of_returns=of_returns),
         poses=tuple(int(pose) for pose in greedy.chosen),
         notes=greedy.notes,
     )
@@ -480,18 +519,9 @@ def _counts(site: Site) -> RecordedCounts:
     )
 
 
-def _metres(point: Float) -> Point:
-    """Round to the micrometre, which hides the last bits in which platforms differ."""
-    x, y, z = (_rounded(value, 6) for value in point)
+def _point(xyz: Iterable[float]) -> Point:
+    x, y, z = map(float, xyz)
     return x, y, z
-
-
-def _share(value: float) -> float:
-    return _rounded(value, 9)
-
-
-def _rounded(value: float, digits: int) -> float:
-    return round(float(value), digits) + 0.0  # no negative zero
 
 
 def _significant(value: float) -> float:

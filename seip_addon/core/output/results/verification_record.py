@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from ...errors import SeipError
 from ...sensing.recordings.figures import CoverageSteps
 from ...sensing.recordings.verification import InstalledSensor
 from ...storage.files import read_small
-from ...storage.json_dataclass import from_json
+from ...storage.json_dataclass import read_record
 
 SCHEMA = "seip-verification/1"
 
@@ -62,12 +60,5 @@ def load_verification(path: Path) -> VerificationRecord:
     SeipError
         It is damaged, or of a version that this program cannot read.
     """
-    text = read_small(path, _MOST_BYTES, "verify the installation again")
-    try:
-        content = json.loads(text)
-        schema = content.get("schema") if isinstance(content, dict) else None
-        if schema == SCHEMA:
-            return from_json(VerificationRecord, content)
-    except (ValueError, RecursionError) as error:
-        raise SeipError(f"{path} is damaged or not a verification: {error}; verify the installation again") from error
-    raise SeipError(f"{path} has the schema {schema!r}, not {SCHEMA!r}: verify the installation again")
+    cure = "verify the installation again"
+    return read_record(VerificationRecord, read_small(path, _MOST_BYTES, cure), SCHEMA, str(path), cure)

@@ -20,7 +20,7 @@ from ...geometry.reference_systems import reprojection
 from ...geometry.solids import Solid
 from ...progress import Progress
 from ...settings import setting
-from ...site.scene_geometry import FROM_SURVEY
+from ...site.scene_geometry import FROM_SURVEY, HEIGHTS_FROM
 from ..streetscape.description import PlacedSolid, SiteDescription, without_covered_buildings
 from ..streetscape.terrain import Relief
 from .geotiff import GeoTiff, read_geotiff
@@ -164,10 +164,7 @@ _SEED = 20_241
 
 def _heights_note(path: Path, smooth: HeightRaster) -> str:
     low, high = float(smooth.heights.min()), float(smooth.heights.max())
-    return (
-        f"roads and ground take their heights from {path.name}, {low:.1f} to {high:.1f} m, smoothed by a Gaussian of "
-        f"{SMOOTHING:g} m"
-    )
+    return f"{HEIGHTS_FROM}{path.name}, {low:.1f} to {high:.1f} m, smoothed by a Gaussian of {SMOOTHING:g} m"
 
 
 def _survey_points(

@@ -53,7 +53,7 @@ class Crossing:
 
 def named_crossings(extract: Extract) -> tuple[Crossing, ...]:
     """Return the crossings of an extract's named streets, sorted by name; a roundabout is one crossing."""
-    streets = [way for way in extract.ways.values() if "highway" in way.tags and is_street(way.tags)]
+    streets = [way for way in extract.ways.values() if is_street(way.tags)]
     round_ways = [way for way in streets if is_roundabout(way.tags)]
     ring_of = {node: number for number, ring in enumerate(joined(way.nodes for way in round_ways)) for node in ring}
     names: defaultdict[tuple[str, int], dict[str, int]] = defaultdict(dict)  # importance of each street of a place
@@ -144,7 +144,7 @@ def _selected(extract: Extract, rule: str, places: Float, origin: tuple[float, f
         nodes = [node for node in extract.nodes.values() if node.tags.get("highway") == "traffic_signals"]
         reach = SIGNAL_REACH
     else:
-        ways = [way for way in extract.ways.values() if "highway" in way.tags and is_street(way.tags)]
+        ways = [way for way in extract.ways.values() if is_street(way.tags)]
         nodes = [node for way in ways if _is_of(way.tags, rule) for node in extract.line(way)]
         reach = ROUNDABOUT_REACH if rule == "roundabouts" else SAME_JUNCTION / 2
     if not nodes:

@@ -264,7 +264,8 @@ def _roads(
             if _type(lane) and len(lane.line) > 1
         }
         if own:
-            yield _road(edge.id, edge.name, None, own, links, left_hand=network.left_hand)
+            is_track = {lane.type for lane in own.values()} - {"sidewalk"} == {"tram"}
+            yield _road(edge.id, "" if is_track else edge.name, None, own, links, left_hand=network.left_hand)
     joints = frozenset(_joints(network))
     for (number, before, after), lanes in _connecting(network, pieces).items():
         junction = network.edges[before].to_node

@@ -99,13 +99,14 @@ class StreetFile:
 
 
 def is_street(tags: Tags, *, service: bool = False) -> bool:
-    """Return whether a way is a street on the surface, or a track of trams or light rail; driveways on request."""
-    if tags.get("area") == "yes" or _is_underground(tags):
-        return False
-    if tags.get("railway") in TRACKS:
-        return True
+    """Return whether a way is a street on the surface; driveways on request."""
     highway = tags.get("highway")
-    return highway in CLASSES or (service and highway == "service")
+    return _is_on_surface(tags) and (highway in CLASSES or (service and highway == "service"))
+
+
+def is_track(tags: Tags) -> bool:
+    """Return whether a way is a track of trams or light rail on the surface."""
+    return _is_on_surface(tags) and tags.get("railway") in TRACKS
 
 
 def importance(tags: Tags) -> int:
@@ -114,8 +115,8 @@ def importance(tags: Tags) -> int:
     return 2 if highway in MAIN_CLASSES else int(highway == "tertiary")
 
 
-def _is_underground(tags: Tags) -> bool:
-    return tags.get("tunnel", "no") not in ("no", "building_passage")
+def _is_on_surface(tags: Tags) -> bool:
+    return tags.get("area") != "yes" and tags.get("tunnel", "no") in ("no", "building_passage")
 
 
 def write_streets(
@@ -189,7 +190,7 @@ def _with_lanes_of_neighbours(extract: Extract, *, service: bool) -> Extract:
     streets = {
         number: way
         for number, way in extract.ways.items()
-        if "highway" in way.tags and is_street(way.tags, service=service) and len(way.nodes) > 1
+        if is_street(way.tags, service=service) and len(way.nodes) > 1
     }
     at: dict[int, list[int]] = {}
     for number, way in streets.items():
@@ -314,7 +315,7 @@ def _pieces(extract: Extract, window: tuple[float, float, float, float], *, serv
     # which refer to ways by id, still apply to it.
     fresh = max(extract.ways, default=0)
     for number, way in extract.ways.items():
-        if not is_street(way.tags, service=service):
+        if not (is_street(way.tags, service=service) or is_track(way.tags)):
             continue
         inside = [
             (node := extract.nodes.get(one)) is not None

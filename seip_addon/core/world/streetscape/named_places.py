@@ -22,6 +22,8 @@ ASSUMED_CROSSING = "Assumed crossing"
 """Name of a crossing in the map of an extract that the extract itself does not contain."""
 MAX_MEDIAN = 6.0  # metres between the crossings of two carriageways that are one
 ROUNDABOUT = "Roundabout"
+TRACKS = {"tram": "Tram track", "rail": "Railway track"}
+"""Name of the tracks beside streets, by lane type; tracks among the lanes of a street are part of it."""
 _MIDDLE = shapely.Point(0.0, 0.0)  # of the place, local axes
 GRID = 1e-3  # metres to which outlines are rounded, so that intersections do not fail
 LEAST_AREA = 1.0
@@ -37,7 +39,7 @@ def named_places(
     unnamed: str = "",
     rings: Collection[str] = (),
 ) -> tuple[NamedArea, ...]:
-    """Return the streets outside junctions, then the painted crossings, each cut to a region.
+    """Return the streets outside junctions, then tracks, then the painted crossings, each cut to a region.
 
     Parameters
     ----------
@@ -55,11 +57,16 @@ def named_places(
     rings : collection of str
         Ids of the roads of roundabouts.
     """
+    paved = [lane for lane in in_groups(lanes, CARRIAGEWAY) if lane.junction_id is None]
+    roads = {lane.road_id for lane in paved if lane.lane_type not in TRACKS}
     streets: dict[str, list[LaneSurface]] = {}
-    for lane in in_groups(lanes, CARRIAGEWAY):
-        if lane.junction_id is None:
+    tracks: dict[str, list[LaneSurface]] = {}
+    for lane in paved:
+        if lane.road_id in roads:
             other = (ROUNDABOUT if lane.road_id in rings else unnamed) or f"Road {lane.road_id}"
             streets.setdefault(names.get(lane.road_id) or other, []).append(lane)
+        else:
+            tracks.setdefault(TRACKS[lane.lane_type], []).append(lane)
     street_areas = {name: lane_outline(own) for name, own in streets.items()}
     crossed = {name: street_areas[name] for name in names.values() if name in streets}
     if unnamed in streets:
@@ -67,8 +74,9 @@ def named_places(
     areas: list[tuple[str, BaseGeometry]] = []
     for name, area in street_areas.items():
         areas += _by_arm(name, area, region) if name == unnamed else [(name, area)]
+    areas += [(name, lane_outline(own)) for name, own in tracks.items()]
     within = ((name, shapely.intersection(area, region, grid_size=GRID)) for name, area in areas)
-    found = [NamedArea(name, area) for name, area in within if area.area >= LEAST_AREA]
+    found = [NamedArea(name, area, track=name in tracks) for name, area in within if area.area >= LEAST_AREA]
     return (*found, *_crossings(objects, crossed, region))
 
 

@@ -10,8 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from seip_addon.core.output.datasets import kitti, openpcdet, pcd
-from seip_addon.core.output.datasets.label_files import read_labels
+from seip_addon.core.output.datasets.formats import FORMATS, point_cloud_range, read_labels
 from seip_addon.core.output.datasets.sample import make_sample
 from tests.builders.scan_frames import make_frame, make_frames, make_run, rotation, write
 
@@ -23,7 +22,7 @@ KITTI_COLUMNS = 15
 @given(st.lists(st.tuples(places, st.tuples(*[st.floats(0.1, 20)] * 3).map(np.array), angles), max_size=6))
 def test_the_range_holds_every_box_in_whole_pillars_and_voxels(found):
     boxes = np.array([[*place, *size, yaw] for place, size, yaw in found]).reshape(-1, 7)
-    extent = openpcdet.point_cloud_range(boxes)
+    extent = point_cloud_range(boxes)
     for place, size, yaw in found:
         signs = np.array(np.meshgrid(*[[-0.5, 0.5]] * 3)).reshape(3, -1).T
         corners = place + (signs * size) @ rotation(yaw).T
@@ -41,8 +40,8 @@ def test_openpcdet_configuration_is_yaml_with_the_range_of_the_labels(tmp_path):
     write("openpcdet", make_frames(), make_run(), tmp_path)
     found = yaml.safe_load((tmp_path / "custom_dataset.yaml").read_text())
     boxes = [read_labels(path) for path in sorted((tmp_path / "labels").iterdir())]
-    assert found["POINT_CLOUD_RANGE"] == openpcdet.point_cloud_range(np.concatenate([box for box, _ in boxes])).tolist()
-    assert found["CLASS_NAMES"] == list(openpcdet.FORMAT.classes.values())
+    assert found["POINT_CLOUD_RANGE"] == point_cloud_range(np.concatenate([box for box, _ in boxes])).tolist()
+    assert found["CLASS_NAMES"] == list(FORMATS["openpcdet"].classes.values())
     assert set(found["MAP_CLASS_TO_KITTI"]) == {*found["CLASS_NAMES"], "DontCare"}
     low, high = np.array(found["POINT_CLOUD_RANGE"]).reshape(2, 3)
     cells = (high - low) / found["DATA_PROCESSOR"][2]["VOXEL_SIZE"]
@@ -53,8 +52,8 @@ def test_openpcdet_configuration_is_yaml_with_the_range_of_the_labels(tmp_path):
 @given(st.integers(0, 10_000))
 def test_kitti_labels_turn_back_into_the_boxes(seed):
     frame = make_frame(seed)
-    sample = _sample(frame, kitti.FORMAT)
-    lines = kitti.sample_files(sample)["training/label_2/000000.txt"]().decode().splitlines()
+    sample = _sample(frame, FORMATS["kitti"])
+    lines = FORMATS["kitti"].sample_files(sample)["training/label_2/000000.txt"]().decode().splitlines()
     assert len(lines) == max(1, len(sample.boxes))
     for row, line in enumerate(lines if len(sample.boxes) else []):
         words = line.split(" ")
@@ -75,13 +74,13 @@ def test_kitti_labels_turn_back_into_the_boxes(seed):
 def test_kitti_occlusion_follows_visibility(visibility, occluded):
     frame = make_frame(1, users=1)
     labels = replace(frame.labels, visibility=np.array([visibility]))
-    sample = _sample(replace(frame, labels=labels), kitti.FORMAT)
-    assert kitti.sample_files(sample)["training/label_2/000000.txt"]().split()[2].decode() == occluded
+    sample = _sample(replace(frame, labels=labels), FORMATS["kitti"])
+    assert FORMATS["kitti"].sample_files(sample)["training/label_2/000000.txt"]().split()[2].decode() == occluded
 
 
 def test_the_viewpoint_of_a_sensors_cloud_is_its_pose():
-    sample = _sample(make_frame(), pcd.FORMAT)
-    for path, content in pcd.sample_files(sample).items():
+    sample = _sample(make_frame(), FORMATS["pcd"])
+    for path, content in FORMATS["pcd"].sample_files(sample).items():
         (line,) = [line for line in content().split(b"\n") if line.startswith(b"VIEWPOINT")]
         words = line.decode().split()[1:]
         sensor = next((one for one in sample.run.sensors if f"/{one.label}/" in path), None)

@@ -13,9 +13,8 @@ import shapely
 
 from seip_addon.core.output.network.network_page import network_page
 from seip_addon.core.output.network.network_record import network_json
-from seip_addon.core.output.network.network_report import make_network_report
 from seip_addon.core.output.network.ranked_sites import gain_text, ranked_sites
-from seip_addon.core.output.network.write import write_network
+from seip_addon.core.output.network.write import make_network_report, write_network
 from seip_addon.core.output.report.blocks import Facts
 from tests.builders.invented_network import make_network, make_site, make_streets, network_of
 
@@ -96,6 +95,17 @@ def test_names_stay_text(tmp_path):
     assert set(HOSTILE) <= {one["name"] for one in properties if one["kind"] == "site"}
 
 
+def test_people_read_products_and_programs_read_types(tmp_path):
+    record = make_network()
+    write_network(tmp_path, record)
+    for name in ("network.html", "report.html"):
+        text = (tmp_path / name).read_text(encoding="utf-8")
+        assert "× OS1-128" in text
+        assert "Product &lt;VLP&gt;" in text
+        assert "os1_128" not in text
+    assert any("× os1_128" in row["types"] for row in rows_of(tmp_path / "sites.csv"))
+
+
 @pytest.mark.filterwarnings("ignore:Glyph")
 def test_the_page_links_to_nothing_but_the_folders_of_its_sites():
     page = network_page(hostile_network(), make_streets())
@@ -152,3 +162,20 @@ def test_networks_without_sensors_are_written(tmp_path, status, sites):
     assert "No site has sensors." in (tmp_path / "network.html").read_text(encoding="utf-8")
     assert facts(record)["Sensors"] == "none"
     assert ("Proof" in facts(record)) == (status != "failed")
+
+
+@pytest.mark.parametrize(
+    ("criterion", "value", "bound", "words"),
+    [
+        ("road", 0.7, 0.7, "sees more of the road."),
+        ("road", 0.7, 0.7121, "sees more than 71.3% of the road."),
+        ("returns", math.log(16.0), math.log(17.31), "has more than 16.4 returns from a typical road user."),
+    ],
+)
+def test_the_certificate_gives_the_bound_rounded_up(criterion, value, bound, words):
+    record = make_network(2, criterion=criterion, value=value, bound=bound)
+    assert (
+        record.certificate
+        == f"Proven: no other use of ${record.budget_usd:,.0f} among these sites and candidates {words}"
+    )
+    assert facts(record)["Proof"] == record.certificate

@@ -10,17 +10,21 @@ import numpy as np
 import pytest
 
 from seip_addon.core.choosing.placement.objective import MOVED, FrontPoint, Objective
+from seip_addon.core.choosing.placement.returns_summary import ReturnsPoint, ReturnsSummary
 from seip_addon.core.errors import SeipError
 from seip_addon.core.output.report.blocks import Card, Facts, Paragraph, Picture, Table
 from seip_addon.core.output.report.evidence import load_evidence
 from seip_addon.core.output.report.html import as_html
 from seip_addon.core.output.report.sections import make_report
-from seip_addon.core.output.report.wording import certificate_sentence
+from seip_addon.core.output.report.wording import altitude_zero, proof, returns_within
 from seip_addon.core.output.report.write import write_report
 from seip_addon.core.output.results.costs import costs_of
 from seip_addon.core.output.results.file_names import REPORT_FILES
+from seip_addon.core.output.results.placement_record import RecordedGeoReference
 from seip_addon.core.progress import finish
 from seip_addon.core.site.installed_cost import load_installed_cost
+from seip_addon.core.site.scene_geometry import HEIGHTS_FROM
+from seip_addon.core.site.sources import SourceCount
 from tests.builders.report_folder import CROSSING, NAME, make_folder
 
 EFFORT = 0.2
@@ -149,13 +153,13 @@ def test_the_pdf_is_whole_and_dated_by_the_record(folder):
                 "gap": 0.5,
                 "status": "feasible",
             },
-            r"Within 50\.00% of the best",
+            r"is better by more than 50\.0%: this bound is proven",
         ),
     ],
 )
 def test_the_certificate_is_a_sentence_for_engineers(tmp_path, goal, found, says):
     make_folder(tmp_path, goal=goal, **found)
-    assert re.search(says, certificate_sentence(load_evidence(tmp_path)))
+    assert re.search(says, proof(load_evidence(tmp_path)))
 
 
 def test_every_sensor_has_a_card_with_its_place_and_its_costs(folder):
@@ -169,6 +173,7 @@ def test_every_sensor_has_a_card_with_its_place_and_its_costs(folder):
         assert facts["Height, tilt"].startswith(f"{sensor.height_m:.2f} m above the ground, ")
         east, north = sensor.map_m[0] - 4_500_000.0, sensor.map_m[1] + 5_300_000.0
         assert facts["Easting, northing"] == f"{east:.1f}, {north:.1f} m"
+        assert facts["Altitude"] == f"{sensor.altitude_m:.1f} m"
         assert facts["Latitude, longitude"] == f"{sensor.latitude_deg:.6f}°, {sensor.longitude_deg:.6f}°"
         assert f"sensor ${sensor.price_usd:,.0f}" in facts["Cost"]
         assert ("mounting on the pole" in facts["Cost"]) == sensor.on_pole
@@ -227,11 +232,39 @@ def test_the_table_of_numbers_is_that_of_the_record(folder):
     record = load_evidence(folder).record
     (table,) = (table for table in blocks(folder, Table) if table.head[0] == "Sensors")
     assert [row[0] for row in table.rows] == [str(point.count) for point in record.front]
-    assert "With fewer or more sensors" not in text_of(folder, front=())
+    assert "With fewer or more sensors" not in text_of(folder, front=record.front[:1])
     proven = (FrontPoint(1, 0.5, 10_000.0, 0.0), FrontPoint(2, 0.75, 20_000.0, 0.0132))
     text = text_of(folder, front=proven)
     assert "none sees more" in text
     assert "at most 1.4 percentage points more" in text
+
+
+def test_bounds_on_returns_are_numbers_of_points_rounded_up(folder):
+    front = (ReturnsPoint(1, 13.0, 10_000.0, 0.0), ReturnsPoint(2, 51.6, 20_000.0, 0.0534))
+    text = text_of(folder, returns=ReturnsSummary(51.6, {"pedestrian": 51.6}, (), front))
+    assert "none has more than 55" in text  # 52.6 × 1.0534 − 1 = 54.41
+    alone = text_of(folder, returns=ReturnsSummary(0.26, {"pedestrian": 0.26}, (), (ReturnsPoint(2, 0.26, 1.0, 1.1),)))
+    assert "With fewer or more sensors" not in alone
+    assert returns_within(0.26, 1.119) == "1.7"
+
+
+@pytest.mark.parametrize(
+    ("changes", "zero"),
+    [
+        ({"sources": (SourceCount("Driving lanes", "extract", 1, 0),), "origin_m": (3.0, 4.0, 0.0)}, "is level"),
+        ({"sources": (SourceCount("Driving lanes", "extract", 1, 0),), "origin_m": (3.0, 4.0, 35.0)}, "map's heights"),
+        ({"assumptions": (f"{HEIGHTS_FROM}hill, 2.tif, 1.0 to 9.0 m, smoothed",)}, "the heights in hill, 2.tif"),
+        ({}, "whose level the map does not give"),
+        (
+            {"geo_reference": RecordedGeoReference("+proj=utm +zone=32 +geoidgrids=egm96.gtx", (0.0, 0.0, 0.0), 0.0)},
+            "egm96.gtx",
+        ),
+    ],
+)
+def test_altitudes_count_from_the_level_that_the_scene_knows(folder, changes, zero):
+    evidence = load_evidence(folder)
+    site = replace(evidence.record.site, **changes)
+    assert zero in altitude_zero(replace(evidence, record=replace(evidence.record, site=site)))
 
 
 def broken(folder, name, content):

@@ -7,7 +7,7 @@ from datetime import UTC, datetime
 import numpy as np
 import pytest
 
-from seip_addon.core.choosing.placement.objective import MOVED, Objective, Solution
+from seip_addon.core.choosing.placement.objective import ACCEPTED_MESSAGE, MOVED, Objective, Solution
 from seip_addon.core.choosing.placement.problem import Placement
 from seip_addon.core.choosing.placement.returns_summary import CrossingReturns, ReturnsSummary
 from seip_addon.core.output.results.answer import answer, change_text, possible_improvement, recommendation, status_text
@@ -76,7 +76,7 @@ def test_the_possible_improvement_is_that_of_the_bound(record):
     assert status_text(unknown).endswith("not proven")
     moved = within(record, 515.0, status=MOVED)
     assert possible_improvement(moved) is None
-    assert status_text(moved).endswith("moved by hand")
+    assert status_text(moved).endswith("not optimised")
 
 
 @pytest.mark.parametrize(("least", "word"), [(0.95, "good"), (0.9, "fair"), (0.5, "poor")])
@@ -95,6 +95,7 @@ def test_an_answer_of_returns_begins_with_a_verdict(record, least, word):
     [
         (lambda one: one, ""),
         (lambda one: within(one, 550.0), "raise the effort"),
+        (lambda one: replace(within(one, 550.0), notes=(ACCEPTED_MESSAGE,)), "let the search run to its end"),
         (lambda one: with_returns(one, least=3.2), "(3.2) at Harbour Road"),
         (lambda one: with_returns(one, least=5.1), ""),
         (

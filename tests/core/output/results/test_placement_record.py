@@ -139,6 +139,19 @@ def test_latitude_and_longitude_are_those_of_the_map_and_its_header(example, run
     assert violations(content_of(record), SCHEMA) == []
 
 
+def test_northings_south_of_the_equator_are_those_of_the_southern_zone(example, run):
+    north = GeoReference("+proj=utm +zone=50 +datum=WGS84", (-4_600_000.0, -8_700_000.0, 0.0, 0.0))
+    record = make_record(replace(example, site=replace(example.site, geo_reference=north)), run)
+    assert record.site.geo_reference.geo_reference.mercator.zone == "50S"
+    for entry in record.sensors:
+        assert entry.northing_m == pytest.approx(entry.map_m[1] - 8_700_000.0 + 10_000_000.0, abs=1e-3)
+        ((longitude, latitude, _),) = north.geographic(np.array([entry.map_m]))
+        assert (entry.longitude_deg, entry.latitude_deg) == pytest.approx((longitude, latitude), abs=1e-8)
+        again = record.site.geo_reference.geo_reference.geographic(np.array([entry.map_m]))[0]
+        assert again[:2] == pytest.approx((longitude, latitude), abs=1e-9)
+    assert make_record(located(example), run).site.geo_reference.projection == "EPSG:32632"
+
+
 def test_the_same_run_gives_the_same_bytes_but_for_times_and_versions(example, run, tmp_path):
     later = replace(run["provenance"], created=datetime(2027, 1, 1, tzinfo=UTC), durations={"visibility": 99.0})
     first, second = make_record(example, run), make_record(example, {**run, "provenance": later})
@@ -156,7 +169,7 @@ def test_the_same_run_gives_the_same_bytes_but_for_times_and_versions(example, r
         ('{"schema": "seip-placement/0"}', "seip-placement/0"),
         (
             '{"schema": "seip-placement/3", "site": 3}',
-            "json is damaged .*: site must be an object, not 3; place",
+            "json is damaged: site must be an object, not 3; place",
         ),
     ],
 )

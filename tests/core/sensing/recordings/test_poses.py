@@ -7,7 +7,7 @@ import pytest
 import yaml
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.output.datasets.kitti import CALIBRATION
+from seip_addon.core.output.datasets.formats import CALIBRATION
 from seip_addon.core.sensing.recordings.poses import read_poses
 from tests.builders.scan_frames import rotation
 

@@ -76,9 +76,9 @@ def test_names_stand_along_their_streets_and_pieces_of_one_street_are_one(plan):
     assert names.positions[main, 1] == pytest.approx(on_main, abs=0.01)
 
 
-def test_places_of_an_extract_have_a_map_and_those_of_a_map_have_none(tmp_path):
+def test_places_of_an_extract_have_a_map(tmp_path):
     places = finish(site_places(crossing().write(tmp_path / "place.osm")))
-    assert places.has_map
+    assert places.places
     assert len(places.plan.junctions) == len(places.places) == 1
     assert parsed_position(places.places[0].key) == pytest.approx((52.5, 13.4), abs=1e-6)
     assert places.plan.junctions[0] == pytest.approx((0.0, 0.0), abs=1e-6)

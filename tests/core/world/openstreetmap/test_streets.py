@@ -8,7 +8,7 @@ from defusedxml.ElementTree import fromstring
 from seip_addon.core.progress import finish
 from seip_addon.core.world.openstreetmap.extract import read_extract, window
 from seip_addon.core.world.openstreetmap.handedness import drives_on_the_left
-from seip_addon.core.world.openstreetmap.streets import is_street, write_streets
+from seip_addon.core.world.openstreetmap.streets import is_street, is_track, write_streets
 from tests.builders.osm_text import Extract, dual_carriageway, roundabout
 
 
@@ -27,22 +27,33 @@ def streets(extract, tmp_path, **options):
     [
         ({"highway": "residential"}, True),
         ({"highway": "primary_link"}, True),
-        ({"railway": "tram"}, True),
-        ({"railway": "light_rail"}, True),
-        ({"railway": "light_rail", "tunnel": "yes"}, False),
-        ({"railway": "rail"}, False),
+        ({"railway": "tram", "name": "Line 41"}, False),
         ({"highway": "service"}, False),
         ({"highway": "footway"}, False),
         ({"highway": "cycleway"}, False),
         ({"highway": "residential", "area": "yes"}, False),
         ({"highway": "primary", "tunnel": "yes"}, False),
         ({"highway": "primary", "tunnel": "building_passage"}, True),
-        ({"railway": "subway"}, False),
         ({}, False),
     ],
 )
 def test_what_a_street_is(tags, street):
     assert is_street(tags) is street
+
+
+@pytest.mark.parametrize(
+    ("tags", "track"),
+    [
+        ({"railway": "tram"}, True),
+        ({"railway": "light_rail"}, True),
+        ({"railway": "light_rail", "tunnel": "yes"}, False),
+        ({"railway": "rail"}, False),
+        ({"railway": "subway"}, False),
+        ({"highway": "residential"}, False),
+    ],
+)
+def test_what_a_track_is(tags, track):
+    assert is_track(tags) is track
 
 
 @pytest.mark.parametrize(

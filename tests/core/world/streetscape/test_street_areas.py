@@ -53,6 +53,18 @@ def test_no_pavement_is_assumed_between_a_track_and_the_carriageway(tmp_path):
     assert area(model, "Pavements").intersection(shapely.box(20, -20, 70, 0)).area > 100
 
 
+def test_tram_is_not_a_street(tmp_path):
+    extract = JUNCTIONS["tram"]()
+    extract.way([(-200, 9), (200, 9)], railway="tram", name="Line 41")
+    model = built(extract, tmp_path)
+    assert model.name == "East Road / North Road"
+    assert [place.name for place in model.places if place.street] == ["East Road", "North Road"]
+    assert [place.name for place in model.places if place.track] == ["Tram track"]
+    crossings = [place.name for place in model.places if place.crossing]
+    assert sum(name.startswith("Crossing of East Road") for name in crossings) == 2
+    assert all("Road" in name for name in crossings)
+
+
 def test_no_pavement_and_no_place_for_posts_lies_in_a_building(tmp_path):
     extract = crossroads()
     extract.house(30, 4, 20, 20)
