@@ -105,11 +105,12 @@ def trade_off(panels: Mapping[str, Sequence[Method]], title: str) -> Figure:
         Methods of each panel, by the label of its error axis; each panel has a default method of the same name.
     """
     rows, columns = math.ceil(len(panels) / COLUMNS), min(len(panels), COLUMNS)
-    figure = new_page((14.0, 5.6 * rows + 1.0), dpi=110, layout="constrained")
+    figure = new_page((14.0, 6.2 * rows + 1.0), dpi=110, layout="constrained")
     axes = [figure.add_subplot(rows, columns, number) for number in range(1, len(panels) + 1)]
     families = list(dict.fromkeys(method.family for methods in panels.values() for method in methods))
     for panel, (error_name, methods) in zip(axes, panels.items(), strict=True):
         _draw_methods(panel, methods, families)
+        panel.set_ylim(panel.get_ylim())  # lines to labels must not change the limits
         style_axes(panel, error_name, "processor time (s)")
     add_legend(figure, axes[:1])
     set_title(figure, title)
@@ -144,6 +145,6 @@ def _draw_methods(panel: Axes, methods: Sequence[Method], families: Sequence[str
     panel.yaxis.set_minor_formatter(LogFormatter())  # plain numbers within a decade
     panel.set_xscale("symlog", linthresh=LINEAR_BELOW, linscale=0.5)
     panel.xaxis.set_minor_locator(NullLocator())
-    panel.set_xlim(-0.35 * LINEAR_BELOW, 2.5 * max(LINEAR_BELOW, *(method.error for method in methods)))
-    panel.margins(y=0.15)
+    panel.set_xlim(-0.35 * LINEAR_BELOW, 8.0 * max(LINEAR_BELOW, *(method.error for method in methods)))
+    panel.margins(y=0.25)
     panel.xaxis.set_major_formatter(FuncFormatter(lambda share, _: f"{share * 100:g} %"))
