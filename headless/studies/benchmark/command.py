@@ -1,4 +1,4 @@
-"""Benchmark of visibility, placement and scans: a page with speed, gaps to bounds, and growth.
+"""Benchmark of visibility, placement and scans: a page with speed against accuracy, gaps to bounds, and growth.
 
 seip study benchmark scenes/junction.blend -o docs
 """
@@ -12,11 +12,13 @@ from functools import partial
 from pathlib import Path
 
 from headless import runtime
+from headless.studies.benchmark.charts import save_charts
 from headless.studies.benchmark.growth import Growth, corridor_growth, placement_growth
 from headless.studies.benchmark.placement import METHODS, SolverRun, compare
 from headless.studies.benchmark.report import Findings, requirements, save_page
 from headless.studies.benchmark.resource_usage import in_fresh_process
 from headless.studies.benchmark.scans import scan_costs
+from headless.studies.benchmark.simplifications import SITE_SENSORS, degradations, simplifications
 from headless.studies.benchmark.street_visibility import street_problem
 from headless.studies.benchmark.visibility import sampled_positions, visibility_costs
 
@@ -35,9 +37,6 @@ from seip_addon.core.site.site import Site, make_site
 from seip_addon.scene.read import read_scene
 
 LOG = logging.getLogger(__name__)
-
-SITE_SENSORS = 4
-"""Number of sensors that are placed at the scene's site."""
 
 LARGEST_METHODS = ("local search", "ours")
 """Methods that can solve the largest instance."""
@@ -88,7 +87,7 @@ def main(argv: list[str], scope: BenchmarkScope | None = None) -> None:
     """Run the measurements and write the results into a folder; tests pass a small ``scope``."""
     parser = argparse.ArgumentParser(prog="benchmark", description=__doc__.splitlines()[0])
     parser.add_argument("scene", type=Path, help="scene (.blend)")
-    parser.add_argument("-o", "--output", type=Path, required=True, help="folder for benchmark.md")
+    parser.add_argument("-o", "--output", type=Path, required=True, help="folder for benchmark.md and benchmark/*.png")
     options = parser.parse_args(argv)
     runtime.check_folder(options.output)
     runtime.open_scene(options.scene)
@@ -97,6 +96,8 @@ def main(argv: list[str], scope: BenchmarkScope | None = None) -> None:
         verdict = "" if one.met else " – NOT MET"
         runtime.print_line(f"{one.quantity}: required {one.required}, measured {one.measured}{verdict}")
     with runtime.incomplete_if_interrupted(options.output):
+        (options.output / "benchmark").mkdir(exist_ok=True)
+        save_charts(options.output / "benchmark", findings)
         save_page(options.output / "benchmark.md", findings)
     runtime.print_line(f"results: {options.output / 'benchmark.md'}")
 
@@ -107,7 +108,10 @@ def measure(geometry: SceneGeometry, scope: BenchmarkScope) -> Findings:
     models = find_models(load_catalogue(), scope.layout.sensors)
     site = make_site(geometry, scope.layout, fields_of_view=fields_of_view(models))
     LOG.info(f"{site.name}: full and lazy scans from {scope.positions} positions")
-    visibility = visibility_costs(site, models, settings, scope.positions)
+    simpler = simplifications(geometry, site, models, scope.layout)
+    visibility = visibility_costs(site, models, settings, scope.positions, simpler)
+    LOG.info("errors of simplified grids")
+    errors = degradations(site, models, settings, simpler, scope.effort)
     runs = placement_runs(geometry, settings, scope)
     growths = measure_growth(site, models, settings, scope)
     LOG.info("scans of traffic")
@@ -118,13 +122,14 @@ def measure(geometry: SceneGeometry, scope: BenchmarkScope) -> Findings:
         "poses": len(site.candidates),
         "triangles": len(site.triangles),
         "positions": len(sampled_positions(site, scope.positions)),
+        "sensor": scope.layout.sensors[0],
         "scanned_by": scope.scanned_by,
         "frames": scope.frames,
         "effort": scope.effort,
         "cores": os.cpu_count(),
         "versions": {name: importlib.metadata.version(name) for name in ("bpy", "numpy", "embreex", "PuLP", "highspy")},
     }
-    return Findings(setting, visibility, runs, growths, scans)
+    return Findings(setting, visibility, errors, runs, growths, scans)
 
 
 def placement_runs(geometry: SceneGeometry, settings: VisibilitySettings, scope: BenchmarkScope) -> list[SolverRun]:

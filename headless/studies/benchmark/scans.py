@@ -1,23 +1,28 @@
-"""Speed of simulated frames of traffic."""
+"""Speed of simulated frames of traffic, with cached returns and by casting every ray."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 from functools import partial
 
 from headless.studies.benchmark.resource_usage import Expense
 from headless.studies.benchmark.visibility import ENGINES
+from headless.studies.full_frames import combined, differing, full_scan
 
 import numpy as np
 
 from seip_addon.core.arrays import Float
 from seip_addon.core.progress import finish
 from seip_addon.core.sensing.lidar.model import LidarModel
+from seip_addon.core.sensing.scans.scanner import Scan
 from seip_addon.core.sensing.scans.sensor import MountedSensor, level_orientation
-from seip_addon.core.sensing.scans.simulation import ScanSettings, prepare
+from seip_addon.core.sensing.scans.simulation import ScanSettings, Simulation, prepare
 from seip_addon.core.sensing.scans.static_scene import StaticScene
-from seip_addon.core.sensing.traffic.bodies import fitted_body
-from seip_addon.core.sensing.traffic.trajectories import RoadUser, Trajectories
+from seip_addon.core.sensing.traffic.bodies import Body, fitted_body
+from seip_addon.core.sensing.traffic.trajectories import RoadUser, Snapshot, Trajectories
+from seip_addon.core.sensing.visibility.settings import Engine
 from seip_addon.core.site.site import Site
 
 SENSORS, ROAD_USERS = 4, 40
@@ -26,8 +31,23 @@ _SIZES = (("car", 4.5, 1.8, 1.5), ("car", 3.9, 1.7, 1.5), ("van", 5.6, 2.0, 2.4)
 _SPEED, _SECONDS, _GAP = 8.0, 10.0, 6.0  # metres per second, seconds, metres
 
 
-def scan_costs(site: Site, static: StaticScene, model: LidarModel, frames: int) -> dict[str, Expense]:
-    """Simulate the same frames of four sensors and forty moving road users with each ray caster.
+@dataclass
+class ScanCost:
+    """Cost of simulated frames.
+
+    Parameters
+    ----------
+    rays, differing : int
+        Rays of all sensors in all frames, and those whose return differs from the full scan's.
+    """
+
+    expense: Expense = field(default_factory=Expense)
+    rays: int = 0
+    differing: int = 0
+
+
+def scan_costs(site: Site, static: StaticScene, model: LidarModel, frames: int) -> dict[str, ScanCost]:
+    """Simulate the same frames of four sensors and forty moving road users by both methods with each ray caster.
 
     Parameters
     ----------
@@ -36,8 +56,8 @@ def scan_costs(site: Site, static: StaticScene, model: LidarModel, frames: int) 
 
     Returns
     -------
-    dict of str to Expense
-        Cost of all frames by ray caster.
+    dict of str to ScanCost
+        Cost of all frames by method and ray caster: ``full bvh``, ``cached bvh``, ``full embree``, ``cached embree``.
     """
     positions = site.candidates.xyz[np.linspace(0, len(site.candidates) - 1, SENSORS).astype(int)]
     sensors = [
@@ -45,13 +65,34 @@ def scan_costs(site: Site, static: StaticScene, model: LidarModel, frames: int) 
     ]
     traffic = moving_traffic(site)
     bodies = [fitted_body(user) for user in traffic.users]
-    costs: dict[str, Expense] = {}
+    costs: dict[str, ScanCost] = {}
     for engine in ENGINES:
         simulation = finish(prepare(static, sensors, traffic, bodies, ScanSettings(engine=engine)))
-        costs[engine] = Expense()
+        full = costs[f"full {engine}"] = ScanCost()
+        cached = costs[f"cached {engine}"] = ScanCost()
         for number in range(frames):
-            costs[engine].time(partial(simulation.frame, number, number / model.rotation_rate))
+            snapshot = traffic.at(number / model.rotation_rate)
+            cached.expense.time(partial(simulation.frame, number, snapshot.time))
+            scans = full.expense.time(partial(_full_frame, simulation, static, bodies, number, snapshot, engine))
+            for scan, reference in zip(simulation.scans(snapshot), scans, strict=True):
+                cached.differing += len(differing(scan, reference))
+        full.rays = cached.rays = frames * sum(len(scanner.directions) for scanner in simulation.scanners)
     return costs
+
+
+def _full_frame(
+    simulation: Simulation,
+    static: StaticScene,
+    bodies: Sequence[Body],
+    number: int,
+    snapshot: Snapshot,
+    engine: Engine,
+) -> list[Scan]:
+    """Simulate a frame by casting every ray of it against the whole scene, and return the scans of its sensors."""
+    surface, owner = combined(static, bodies, snapshot, engine)
+    scans = [full_scan(scanner, surface, owner, len(bodies)) for scanner in simulation.scanners]
+    simulation.measure(number, snapshot, scans)
+    return scans
 
 
 def moving_traffic(site: Site) -> Trajectories:

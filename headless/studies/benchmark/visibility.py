@@ -1,12 +1,13 @@
-"""Time of full scans and of the lazy engine, which must compute the same grid."""
+"""Time of full scans and of the lazy engine, which must compute the same grid, on exact and simplified scenes."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 
 from headless.studies.benchmark.resource_usage import Expense
+from headless.studies.benchmark.simplifications import Simplification
 from headless.studies.full_scan import seen_by_tilted_full_scan
 
 import numpy as np
@@ -52,45 +53,64 @@ def sampled_positions(site: Site, samples: int) -> list[Integer]:
 
 
 def visibility_costs(
-    site: Site, models: Mapping[str, LidarModel], settings: VisibilitySettings, samples: int
+    site: Site,
+    models: Mapping[str, LidarModel],
+    settings: VisibilitySettings,
+    samples: int,
+    simpler: Sequence[Simplification] = (),
 ) -> dict[str, Cost]:
-    """Compute visibility at sampled positions by full scans and lazily, with each ray caster.
+    """Compute visibility at sampled positions by full scans and lazily, with each ray caster and simplification.
 
     Parameters
     ----------
     samples : int
         Number of positions, evenly spread over the site.
+    simpler : sequence of Simplification
+        Simplifications, computed only with Embree.
 
     Returns
     -------
     dict of str to Cost
-        Costs by method: ``full bvh``, ``lazy bvh``, ``full embree``, ``lazy embree``.
+        Costs by method: ``full bvh``, ``lazy bvh``, ``full embree``, ``lazy embree``, ``full azimuth ÷ 2``, …
 
     Raises
     ------
     SeipError
         A lazy result differs from its full scan.
     """
+    groups = sampled_positions(site, samples)
+    costs: dict[str, Cost] = {}
+    for engine in ENGINES:
+        costs |= _full_and_lazy(engine, site, models, settings, engine, groups)
+    for one in simpler:
+        costs |= _full_and_lazy(one.name, one.site, one.models, settings, "embree", groups)
+    return costs
+
+
+def _full_and_lazy(
+    name: str,
+    site: Site,
+    models: Mapping[str, LidarModel],
+    settings: VisibilitySettings,
+    engine: Engine,
+    groups: Sequence[Integer],
+) -> dict[str, Cost]:
+    """Compute visibility of groups of poses, one position each, by full scans and lazily; the grids must be equal."""
     candidates = site.candidates
     surfaces = near_surfaces(site.triangles, site.targets.xyz, settings.delta, site.reflectivity)
-    costs = {f"{scan} {engine}": Cost() for engine in ENGINES for scan in ("full", "lazy")}
-    for engine in ENGINES:
-        caster = make_ray_caster(site.triangles, engine)
-        lazy = VisibilityModel(site.targets.xyz, site.reflectivity, settings, caster)
-        for poses in sampled_positions(site, samples):
-            first = poses[0]
-            used = [models[key] for key in candidates.sensor[poses].tolist()]
-            yaw, tilt = float(candidates.yaw[first]), float(candidates.tilt[first])
-            position = ScanPosition(caster, candidates.xyz[first], yaw, used, settings, site.reflectivity)
-
-            cost = costs[f"full {engine}"]
-            full_grid, rays = cost.expense.time(partial(seen_by_tilted_full_scan, position, tilt, surfaces))
-            cost.add(rays, full_grid)
-
-            cost = costs[f"lazy {engine}"]
-            rows = cost.expense.time(partial(compute_rows, lazy, candidates, models, poses))
-            lazy_grid = np.unpackbits(rows.packed, axis=1, count=lazy.targets).astype(bool)
-            cost.add(rows.rays, lazy_grid)
-            if (full_grid != lazy_grid).any():
-                raise SeipError(f"pose {first}: the lazy {engine} grid differs from the full scan: a defect")
-    return costs
+    caster = make_ray_caster(site.triangles, engine)
+    lazy_model = VisibilityModel(site.targets.xyz, site.reflectivity, settings, caster)
+    full, lazy = Cost(), Cost()
+    for poses in groups:
+        first = poses[0]
+        used = [models[key] for key in candidates.sensor[poses].tolist()]
+        yaw, tilt = float(candidates.yaw[first]), float(candidates.tilt[first])
+        position = ScanPosition(caster, candidates.xyz[first], yaw, used, settings, site.reflectivity)
+        full_grid, rays = full.expense.time(partial(seen_by_tilted_full_scan, position, tilt, surfaces))
+        full.add(rays, full_grid)
+        rows = lazy.expense.time(partial(compute_rows, lazy_model, candidates, models, poses))
+        lazy_grid = np.unpackbits(rows.packed, axis=1, count=lazy_model.targets).astype(bool)
+        lazy.add(rows.rays, lazy_grid)
+        if (full_grid != lazy_grid).any():
+            raise SeipError(f"pose {first}: the lazy {name} grid differs from the full scan: a defect")
+    return {f"full {name}": full, f"lazy {name}": lazy}

@@ -10,6 +10,7 @@ from headless.studies.benchmark.growth import growth_exponent
 from headless.studies.benchmark.placement import METHODS, SolverRun, compare
 from headless.studies.benchmark.report import Findings, requirements
 from headless.studies.benchmark.resource_usage import Expense
+from headless.studies.benchmark.scans import ScanCost
 from headless.studies.benchmark.street_visibility import street_problem
 from headless.studies.benchmark.visibility import Cost
 
@@ -40,9 +41,21 @@ def test_the_page_has_every_method(small_scene, tmp_path):
     pytest.importorskip("embreex", reason="embreex is not installed")
     benchmark.main([str(small_scene), "-o", str(tmp_path)], SMALL)
     page = (tmp_path / "benchmark.md").read_text(encoding="utf-8")
-    assert len(re.findall(r"\| (?:met|\*\*not met\*\*) \|", page)) == 6
-    for method in ("full bvh", "lazy bvh", "full embree", "lazy embree", "bvh", "embree"):
+    assert len(re.findall(r"\| (?:met|\*\*not met\*\*) \|", page)) == 9
+    for method in ("full bvh", "lazy bvh", "full embree", "lazy embree", "cached bvh", "cached embree"):
         assert f"\n| {method} | " in page
+    for simplification in (
+        "none",
+        "azimuth ÷ 8",
+        "channels ÷ 2",
+        "grid of 4 m",
+        "objects as boxes",
+        "objects decimated",
+    ):
+        assert f"\n| {simplification} | " in page
+    for chart in re.findall(r"\]\((benchmark/\w+\.png)\)", page):
+        assert (tmp_path / chart).read_bytes().startswith(b"\x89PNG")
+    assert page.count(".png)") == 2
     for method in METHODS:
         assert f"60 × 200, N = 3 | {method} | " in page
     for task in ("visibility of a corridor", "placement, N = 4"):
@@ -78,13 +91,21 @@ def test_requirements_are_met_only_by_what_meets_them():
         run_of("many", "ours", 59.0, 991.0, 1000.0),
         run_of("largest", "ours", 119.0, 984.0, 1000.0),
     ]
-    findings = Findings({}, visibility, runs, [], {})
+    scans = {
+        "full bvh": ScanCost(Expense(30.0), 2_000_000, 0),
+        "cached bvh": ScanCost(Expense(2.0), 2_000_000, 2),
+        "full embree": ScanCost(Expense(10.0), 2_000_000, 0),
+        "cached embree": ScanCost(Expense(2.1), 2_000_000, 1),
+    }
+    findings = Findings({}, visibility, {}, runs, [], scans)
     checks = requirements(findings)
-    assert [check.met for check in checks] == [True, True, False, True, True, False]
+    assert [check.met for check in checks] == [True, True, False, True, True, False, True, False, True]
     assert checks[2].measured == "9×"
     runs[1] = run_of("few", "PuLP + CBC", 30.0, 901.0, math.inf)  # better than what was said to be proven
     checks = requirements(replace(findings, runs=runs))
     assert not checks[3].met
+    scans["cached embree"].differing = 3
+    assert not requirements(findings)[-1].met
 
 
 @given(st.floats(-2, 3), st.floats(0.1, 10))

@@ -262,10 +262,7 @@ def prove_by_program(incumbent: Incumbent, among: Integer, solver: str, work: Wo
 
 
 def _root_operations(entries: int) -> float:
-    """Return the work of the first linear relaxation of a program, in multiplications.
-
-    The benchmark measures it against the entries of A (`seip study benchmark`, under “Growth”).
-    """
+    """Return the work of the first linear relaxation of a program, in multiplications."""
     return ROOT_OPERATIONS * float(entries) ** 2
 
 

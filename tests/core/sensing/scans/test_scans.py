@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import fields, replace
 
+from headless.studies.full_frames import SLACK, combined, differing, full_scan
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -34,7 +36,7 @@ from tests.builders.traffic_by_hand import (
 )
 from tests.engines import ANY, each_engine, needs_any
 from tests.oracles.float64_rays import first_hits
-from tests.oracles.full_frames import SLACK, combined, differing, exact_hit, full_scan, grazes, passes_an_edge
+from tests.oracles.grazing_rays import exact_hit, grazes, passes_an_edge
 from tests.oracles.random_cases import cases
 from tests.oracles.visibility_search import behind_prisms
 
