@@ -123,8 +123,7 @@ def save_speed_accuracy_chart(
             continue
         ends = np.array([[loss.value - loss.low], [loss.high - loss.value]]) * 100.0
         panel.errorbar(seconds[name], value, yerr=ends, fmt="o", color=colour(row), capsize=3.0, label=name)
-        place = {"xytext": (6, 5), "textcoords": "offset points", "color": INK, "fontsize": 9}
-        panel.annotate(name, (seconds[name], value), **place)
+        panel.annotate(name, (seconds[name], value), xytext=(6, 5), textcoords="offset points", color=INK, fontsize=9)
     panel.axhline(0.0, color=INK, linewidth=0.8)
     panel.set_xscale("log")
     save_chart(path, figure, title, [panel])
