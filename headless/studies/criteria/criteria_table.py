@@ -9,6 +9,7 @@ from typing import Any
 
 from headless.detection.average_precision import (
     Evaluation,
+    average_precisions_of_runs,
     average_precisions_without_each_run,
     evaluate,
     jackknife_reach,
@@ -220,6 +221,9 @@ class StudiedType:
                     "average_precision": {
                         name: evaluations[number].average_precision for name, evaluations in evaluated.items()
                     },
+                    "in_halves": {
+                        name: in_halves(evaluations[number]).tolist() for name, evaluations in evaluated.items()
+                    },
                 }
 
 
@@ -262,6 +266,13 @@ def precision_of(evaluation: Evaluation) -> IntervalEstimate:
     if left_out is None:
         return IntervalEstimate(value, -math.inf, math.inf)
     return IntervalEstimate(value, *share_interval(value, left_out, len(evaluation.wanted)))
+
+
+def in_halves(evaluation: Evaluation) -> Float:
+    """Return average precision in the first half of the runs, rounded up, and in the others, (2,) float64."""
+    runs = int(evaluation.run.max()) + 1
+    first = np.arange(runs) < (runs + 1) // 2
+    return average_precisions_of_runs(evaluation, np.array([first, ~first]))
 
 
 def difference_of(one: Evaluation, other: Evaluation) -> IntervalEstimate:

@@ -7,6 +7,7 @@ import io
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -22,9 +23,11 @@ from seip_addon.core.storage.files import read_small
 
 AP = {name: f"ap_{name.replace('-', '_')}" for name in ("vehicles", "two-wheelers", "pedestrians")}
 """Columns of average precision by class of road users."""
+HALVES = {name: (f"{column}_first", f"{column}_second") for name, column in AP.items()}
+"""Columns of average precision in the first half of the runs, and in the others."""
 CRITERIA = ("coverage", "returns", "occupancy_entropy", "egvs", "inspe", "pe_vgop")
 """Columns of criteria, as in `criteria.site_criteria`, which needs torch."""
-COLUMNS = ("site", "placement", "kind", "sensors", *AP.values(), *CRITERIA)
+COLUMNS = ("site", "placement", "kind", "sensors", *AP.values(), *chain.from_iterable(HALVES.values()), *CRITERIA)
 FEWEST = 4
 """Placements of a site below which a criterion is not scored there."""
 _MOST_BYTES = 1 << 26
@@ -59,6 +62,7 @@ def table_rows(site: str, placements: Sequence[Mapping[str, Any]]) -> Iterator[t
     for number, one in enumerate(placements, start=1):
         sensors = "; ".join(" ".join(f"{value:.3f}" for value in xyz) for xyz in one["sensors"])
         precision = [one["average_precision"].get(name) for name in AP]
+        precision += chain.from_iterable(one["in_halves"].get(name, (None, None)) for name in AP)
         values = [one["criteria"].get(key) for key in CRITERIA]
         figures = ["" if value is None or math.isnan(value) else f"{value:.6f}" for value in (*precision, *values)]
         yield (site, number, one["kind"], sensors, *figures)
@@ -112,11 +116,7 @@ def read_criterion(path: Path, table: Placements) -> dict[str, Float]:
 
 def criterion_column(path: Path, table: Placements, key: str) -> dict[str, Float]:
     """Return the values of a criterion that is a column of the table, at the sites that have it."""
-    return {
-        site: np.array([_number(path, row, key) for row in rows])
-        for site, rows in table.items()
-        if all(row.get(key) for row in rows)
-    }
+    return {site: numbers(path, rows, key) for site, rows in table.items() if all(row.get(key) for row in rows)}
 
 
 def score(path: Path, table: Placements, values: Mapping[str, Float]) -> list[CriterionScore]:
@@ -136,20 +136,26 @@ def score(path: Path, table: Placements, values: Mapping[str, Float]) -> list[Cr
             rows = table[site]
             if len(rows) < FEWEST or not all(row[column] for row in rows):
                 continue
-            precision = np.array([_number(path, row, column) for row in rows])
+            precision = numbers(path, rows, column)
             # A criterion without any differences says nothing: its correlation is undefined, and counts as zero.
             correlations.append(float(np.nan_to_num(rank_agreements(own, precision)[0])))
             losses.append(float(precision.max() - precision[int(np.argmax(own))]))
         if correlations:
-            figures = (_mean(np.array(each)) for each in (correlations, losses))
+            figures = (mean_over_sites(np.array(each)) for each in (correlations, losses))
             scores.append(CriterionScore(road_users, len(correlations), *figures))
     return scores
 
 
-def _mean(values: Float) -> IntervalEstimate:
+def mean_over_sites(values: Float) -> IntervalEstimate:
+    """Return the mean of figures of sites, with the 95 % interval by Student's t."""
     mean = float(values.mean())
     reach = student_reach(values) if len(values) > 1 else math.inf
     return IntervalEstimate(mean, mean - reach, mean + reach)
+
+
+def numbers(path: Path, rows: Sequence[Mapping[str, str]], column: str) -> Float:
+    """Return the numbers in a column of some rows, (n,) float64."""
+    return np.array([_number(path, row, column) for row in rows])
 
 
 def _read_csv(path: Path, needed: Sequence[str]) -> list[dict[str, str]]:

@@ -11,7 +11,7 @@ from headless.detection import shared_scans
 from headless.detection.average_precision import evaluate
 from headless.detection.matching import Rule
 from headless.studies.criteria import command as criteria_study
-from headless.studies.criteria.criteria_table import difference_of
+from headless.studies.criteria.criteria_table import difference_of, in_halves
 
 import numpy as np
 
@@ -85,3 +85,10 @@ def test_difference_is_the_jackknife_of_pairs():
     reach = student_quantile(3) * np.sqrt(3 / 4 * ((left_out - left_out.mean()) ** 2).sum())
     assert change.value == pytest.approx(3 / 40)
     assert (change.low, change.high) == pytest.approx((3 / 40 - reach, 3 / 40 + reach))
+
+
+@pytest.mark.parametrize("counts", [[9, 8, 7, 6], [10, 2, 5, 4, 0]])
+def test_halves_are_evaluated_by_themselves(counts):
+    half = (len(counts) + 1) // 2
+    alone = [found(counts[:half]).average_precision, found(counts[half:]).average_precision]
+    assert in_halves(found(counts)).tolist() == pytest.approx(alone)

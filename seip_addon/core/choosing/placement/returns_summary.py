@@ -16,10 +16,10 @@ GOOD_SHARE, FAIR_SHARE = 0.95, 0.8
 
 NOT_BY_DETECTION = (
     "the criterion is expected returns, not detection: at ten junctions the average precision of a detector with its "
-    "best placement was 5 points lower for vehicles, 11 for two-wheelers and 7 for pedestrians than with the best of "
-    "about 106 placements; a choice among finalists by detection may find more"
+    "best placement was 2 points lower for vehicles, 6 for two-wheelers and 5 for pedestrians than with the best of "
+    "about 106 placements; a choice among finalists by detection measures it here"
 )
-"""Note on placements for returns that no detector has judged; the figures are those of the earlier detector."""
+"""Note on placements for returns that no detector has judged; docs/open-benchmark.md has its figures."""
 
 SURFACE_SEEN = (
     "Seen means that the surface of the road itself is measured. People and vehicles reflect more light and are "

@@ -1,0 +1,130 @@
+r"""What ways of choosing a placement lose in average precision against the default, and the time that they take.
+
+A placement that is the best of many by measured average precision (AP) owes some of it to chance. Each choice is
+therefore scored on runs of traffic that it did not see. Let :math:`a_p` be the mean AP of the classes with placement p
+in one half of the runs of a site, and :math:`b_p` that in the other half. A choice that takes placement c loses
+:math:`b_d - b_c` against the placement d that the default criterion likes best; the mean of both ways round counts. A
+criterion takes the placement that it likes best; of finalists, the one with the largest :math:`a_p` is taken.
+"""
+
+from __future__ import annotations
+
+import resource
+import subprocess
+import sys
+import tempfile
+from collections.abc import Mapping, Sequence
+from itertools import chain
+from pathlib import Path
+
+import numpy as np
+
+from seip_addon.core.arrays import Float, Integer
+from seip_addon.core.errors import SeipError
+from seip_addon.core.estimates import IntervalEstimate
+from seip_addon.core.output.pictures.chart_style import colour, new_figure, save_chart, style_axes
+from seip_addon.core.output.pictures.palette import INK
+
+from .table import CRITERIA, HALVES, Placements, criterion_column, mean_over_sites, numbers
+
+FINALISTS = (2, 4, 8, 16)
+"""Numbers of finalists that are compared."""
+DEFAULT = "returns"
+"""Criterion against which the others lose or gain."""
+SHORTLISTS = ("coverage", DEFAULT)
+"""Criteria of which finalists are the best placements, in turn: those that `seip place` has."""
+BLEND = ("returns", "egvs", "inspe", "pe_vgop")
+"""Criteria whose standardised values have a mean that is compared too."""
+TIMED = {
+    "coverage": ("--criterion", "road"),
+    "returns": ("--criterion", "returns"),
+    **{f"{count} finalists": ("--finalists", str(count)) for count in FINALISTS},
+}
+"""Options of `seip place` for the choices that it makes."""
+
+
+def choice_losses(path: Path, table: Placements) -> dict[str, IntervalEstimate]:
+    """Return what each choice loses in mean AP of the classes against the default, the mean over sites, -1 to 1.
+
+    Parameters
+    ----------
+    path : path
+        File of the table, for messages.
+    """
+    columns = {key: criterion_column(path, table, key) for key in CRITERIA}
+    lost: dict[str, list[float]] = {}
+    for site, rows in table.items():
+        parts = [_mean_precision(path, rows, half) for half in (0, 1)]
+        values = {key: column[site] for key, column in columns.items() if site in column}
+        default = int(np.argmax(values[DEFAULT]))
+        for name, pool in _pools(values).items():
+            losses = [
+                scored[default] - scored[pool[int(np.argmax(judged[pool]))]] for judged, scored in (parts, parts[::-1])
+            ]
+            lost.setdefault(name, []).append(float(np.mean(losses)))
+    return {name: mean_over_sites(np.array(values)) for name, values in lost.items()}
+
+
+def _pools(values: Mapping[str, Float]) -> dict[str, Integer]:
+    """Return the placements among which each choice is made by detection: one for a criterion alone."""
+    pools = {key: np.array([int(np.argmax(own))]) for key, own in values.items()}
+    if all(key in values for key in BLEND):
+        blend = np.sum([_standardised(values[key]) for key in BLEND], axis=0)
+        pools["blend"] = np.array([int(np.argmax(blend))])
+    ranked = [np.argsort(-values[key], kind="stable").tolist() for key in SHORTLISTS]
+    in_turn = np.array(list(dict.fromkeys(chain.from_iterable(zip(*ranked, strict=True)))))
+    return pools | {f"{count} finalists": in_turn[:count] for count in FINALISTS}
+
+
+def _standardised(values: Float) -> Float:
+    spread = float(values.std())
+    standardised: Float = (values - values.mean()) / (spread or 1.0)
+    return standardised
+
+
+def _mean_precision(path: Path, rows: Sequence[Mapping[str, str]], half: int) -> Float:
+    """Return the mean AP of the classes in a half of the runs, for each placement of a site, (n,)."""
+    columns = [halves[half] for halves in HALVES.values() if all(row.get(one) for row in rows for one in halves)]
+    if not columns:
+        raise SeipError(f"{path} has no average precision by halves of the runs: build the benchmark again")
+    mean: Float = np.mean([numbers(path, rows, column) for column in columns], axis=0)
+    return mean
+
+
+def measure_seconds(scene: Path, sensor: str, count: int) -> dict[str, float]:
+    """Return the processor seconds of `seip place` for each of its choices at a site, everything computed anew."""
+    seconds = {}
+    for name, options in TIMED.items():
+        with tempfile.TemporaryDirectory() as folder:
+            sensors = ("--sensor", sensor, "--count", str(count), "--no-render")
+            command = [sys.executable, "-m", "headless", "place", str(scene), *sensors, *options, "-o", folder]
+            before = resource.getrusage(resource.RUSAGE_CHILDREN)
+            done = subprocess.run(command, capture_output=True, text=True, check=False)  # noqa: S603 -- our own command
+            after = resource.getrusage(resource.RUSAGE_CHILDREN)
+            seconds[name] = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+            if done.returncode:
+                raise SeipError(f"seip place {' '.join(options)} failed: {done.stderr.strip().splitlines()[-1]}")
+    return seconds
+
+
+def save_speed_accuracy_chart(
+    path: Path, seconds: Mapping[str, float], losses: Mapping[str, IntervalEstimate], title: str
+) -> None:
+    """Draw the loss of each choice, in points, against its seconds on a logarithmic axis.
+
+    Choices without a time, which `seip place` does not make, are lines across the chart.
+    """
+    figure, (panel,) = new_figure(7.2, 4.6)
+    style_axes(panel, "processor seconds, everything computed anew", "average precision below the default, points")
+    for row, (name, loss) in enumerate(losses.items()):
+        value = 100.0 * loss.value
+        if name not in seconds:
+            panel.axhline(value, color=colour(row), linewidth=1.0, linestyle="--", label=name)
+            continue
+        ends = np.array([[loss.value - loss.low], [loss.high - loss.value]]) * 100.0
+        panel.errorbar(seconds[name], value, yerr=ends, fmt="o", color=colour(row), capsize=3.0, label=name)
+        place = {"xytext": (6, 5), "textcoords": "offset points", "color": INK, "fontsize": 9}
+        panel.annotate(name, (seconds[name], value), **place)
+    panel.axhline(0.0, color=INK, linewidth=0.8)
+    panel.set_xscale("log")
+    save_chart(path, figure, title, [panel])
