@@ -9,7 +9,7 @@ from functools import partial
 import bpy
 import numpy as np
 
-from seip_addon.core.arrays import Boolean, Float, Integer
+from seip_addon.core.arrays import Float, Integer
 from seip_addon.core.choosing.placement.objective import Objective, placement_problem
 from seip_addon.core.choosing.placement.search_limits import SolverLimits
 from seip_addon.core.choosing.placement.solver import solve
@@ -120,18 +120,13 @@ def degradations(
         placement = finish(solve(replace(problem, forbidden=other_types), SolverLimits(effort=effort)))
         best = placement.chosen if best is None else best
         results[one.name] = Degradation(
-            wrong=wrong_pairs(exact, visible[:, one.nearest_target]),
+            wrong=float((visible[:, one.nearest_target] != exact).sum() / exact.sum()),
             claimed=float(visible[placement.chosen].any(axis=0).mean()),
             coverage=float(exact[placement.chosen].any(axis=0).mean()),
             kept=len(np.intersect1d(placement.chosen, best)),
             proven=placement.gap < 1e-6,
         )
     return results
-
-
-def wrong_pairs(exact: Boolean, visible: Boolean) -> float:
-    """Return the number of entries in which a grid differs from the exact one, per visible pair of the exact one."""
-    return float((visible != exact).sum() / exact.sum())
 
 
 def every_nth_azimuth(model: LidarModel, n: int) -> LidarModel:
