@@ -18,11 +18,13 @@ from itertools import chain
 from pathlib import Path
 
 import numpy as np
+from matplotlib.ticker import LogFormatter
 
 from seip_addon.core.arrays import Float, Integer
 from seip_addon.core.errors import SeipError
 from seip_addon.core.estimates import IntervalEstimate
-from seip_addon.core.output.pictures.chart_style import colour, new_figure, save_chart, style_axes
+from seip_addon.core.output.pictures.chart_style import add_legend, colour, new_figure, set_title, style_axes
+from seip_addon.core.output.pictures.drawing import draw_callouts, save_png
 from seip_addon.core.output.pictures.palette import INK
 
 from .table import CRITERIA, HALVES, Placements, criterion_column, mean_over_sites, numbers
@@ -35,6 +37,16 @@ SHORTLISTS = ("coverage", DEFAULT)
 """Criteria of which finalists are the best placements, in turn: those that `seip place` has."""
 BLEND = ("returns", "egvs", "inspe", "pe_vgop")
 """Criteria whose standardised values have a mean that is compared too."""
+NAMES = {
+    "returns": "returns (the default)",
+    "occupancy_entropy": "S-MIG",
+    "egvs": "EGVS",
+    "inspe": "InSPE",
+    "pe_vgop": "PE-VGOP",
+    "blend": "mean of returns, EGVS, InSPE and PE-VGOP",
+}
+"""Names of choices in charts."""
+LINES = ("--", ":", "-.")
 TIMED = {
     "coverage": ("--criterion", "road"),
     "returns": ("--criterion", "returns"),
@@ -114,16 +126,23 @@ def save_speed_accuracy_chart(
 
     Choices without a time, which `seip place` does not make, are lines across the chart.
     """
-    figure, (panel,) = new_figure(7.2, 4.6)
+    figure, (panel,) = new_figure(7.6, 4.8)
     style_axes(panel, "processor seconds, everything computed anew", "average precision below the default, points")
-    for row, (name, loss) in enumerate(losses.items()):
-        value = 100.0 * loss.value
-        if name not in seconds:
-            panel.axhline(value, color=colour(row), linewidth=1.0, linestyle="--", label=name)
-            continue
-        ends = np.array([[loss.value - loss.low], [loss.high - loss.value]]) * 100.0
-        panel.errorbar(seconds[name], value, yerr=ends, fmt="o", color=colour(row), capsize=3.0, label=name)
-        panel.annotate(name, (seconds[name], value), xytext=(6, 5), textcoords="offset points", color=INK, fontsize=9)
+    timed = [name for name in losses if name in seconds]
+    points = np.array([(seconds[name], 100.0 * losses[name].value) for name in timed])
+    ends = np.array([(losses[name].value - losses[name].low, losses[name].high - losses[name].value) for name in timed])
+    panel.errorbar(*points.T, yerr=100.0 * ends.T, fmt="o", color=colour(0), capsize=3.0, zorder=3)
+    for row, name in enumerate(name for name in losses if name not in seconds):
+        line = {"color": colour(row + 1), "linestyle": LINES[row % len(LINES)]}
+        panel.axhline(100.0 * losses[name].value, linewidth=1.2, label=NAMES.get(name, name), **line)
     panel.axhline(0.0, color=INK, linewidth=0.8)
     panel.set_xscale("log")
-    save_chart(path, figure, title, [panel])
+    for of in (panel.xaxis.set_major_formatter, panel.xaxis.set_minor_formatter):
+        of(LogFormatter(minor_thresholds=(2.0, 0.5)))  # plain numbers within a decade
+    panel.margins(x=0.15)
+    add_legend(figure, [panel])
+    set_title(figure, title)
+    figure.draw_without_rendering()  # fixes positions and limits of the panel, in which the labels are placed
+    figure.set_layout_engine("none")
+    draw_callouts(panel, points, [NAMES.get(name, name) for name in timed], points, zorder=4)
+    save_png(path, figure)

@@ -131,7 +131,7 @@ def _chart(options: argparse.Namespace) -> None:
     ]
     save_csv(options.output / "choices.csv", CHOICE_COLUMNS, rows)
     save_speed_accuracy_chart(
-        options.output / "speed_accuracy.png", seconds, losses, f"Choosing {COUNT} × {SENSOR}: time against accuracy"
+        options.output / "speed_accuracy.png", seconds, losses, "Choice of two OS1-128: time against accuracy"
     )
     for row in rows:
         runtime.print_line("{:14} loses {} points [{}, {}] {} s".format(*row))
