@@ -16,6 +16,7 @@ import tempfile
 from collections.abc import Mapping, Sequence
 from itertools import chain
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.ticker import LogFormatter
@@ -133,8 +134,8 @@ def save_speed_accuracy_chart(
     ends = np.array([(losses[name].value - losses[name].low, losses[name].high - losses[name].value) for name in timed])
     panel.errorbar(*points.T, yerr=100.0 * ends.T, fmt="o", color=colour(0), capsize=3.0, zorder=3)
     for row, name in enumerate(name for name in losses if name not in seconds):
-        line = {"color": colour(row + 1), "linestyle": LINES[row % len(LINES)]}
-        panel.axhline(100.0 * losses[name].value, linewidth=1.2, label=NAMES.get(name, name), **line)
+        line: dict[str, Any] = {"color": colour(row + 1), "linestyle": LINES[row % len(LINES)], "linewidth": 1.2}
+        panel.axhline(100.0 * losses[name].value, label=NAMES.get(name, name), **line)
     panel.axhline(0.0, color=INK, linewidth=0.8)
     panel.set_xscale("log")
     for of in (panel.xaxis.set_major_formatter, panel.xaxis.set_minor_formatter):
