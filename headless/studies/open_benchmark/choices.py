@@ -132,7 +132,7 @@ def save_speed_accuracy_chart(
     timed = [name for name in losses if name in seconds]
     points = np.array([(seconds[name], 100.0 * losses[name].value) for name in timed])
     ends = np.array([(losses[name].value - losses[name].low, losses[name].high - losses[name].value) for name in timed])
-    panel.errorbar(*points.T, yerr=100.0 * ends.T, fmt="o", color=colour(0), capsize=3.0, zorder=3)
+    panel.errorbar(points[:, 0], points[:, 1], yerr=100.0 * ends.T, fmt="o", color=colour(0), capsize=3.0, zorder=3)
     for row, name in enumerate(name for name in losses if name not in seconds):
         line: dict[str, Any] = {"color": colour(row + 1), "linestyle": LINES[row % len(LINES)], "linewidth": 1.2}
         panel.axhline(100.0 * losses[name].value, label=NAMES.get(name, name), **line)
