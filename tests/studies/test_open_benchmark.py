@@ -88,6 +88,19 @@ def test_choices_are_scored_on_runs_that_they_did_not_see(tmp_path):
     assert chart.stat().st_size > 10_000
 
 
+def test_choices_need_the_criteria_of_finalists_and_halves_of_the_runs(table, tmp_path):
+    with pytest.raises(SeipError, match="no average precision by halves"):
+        choice_losses(table, read_table(table))
+    path = tmp_path / "without_returns.csv"
+    with path.open("w", newline="", encoding="utf-8") as file:
+        rows = csv.DictWriter(file, COLUMNS)
+        rows.writeheader()
+        row = dict.fromkeys(COLUMNS, "") | {"site": "one", "placement": 1, "coverage": 1}
+        rows.writerow(row | dict.fromkeys(HALVES["vehicles"], 0.5))
+    with pytest.raises(SeipError, match="no values of returns at one"):
+        choice_losses(path, read_table(path))
+
+
 def test_criterion_is_read_in_any_order_of_rows(table, tmp_path):
     path = write(tmp_path / "mine.csv", {"two": [4, 3, 2, 1]})
     lines = path.read_text(encoding="utf-8").splitlines()

@@ -9,14 +9,16 @@ criterion takes the placement that it likes best; of finalists, the one with the
 
 from __future__ import annotations
 
-import resource
 import subprocess
 import sys
 import tempfile
 from collections.abc import Mapping, Sequence
+from functools import partial
 from itertools import chain
 from pathlib import Path
 from typing import Any
+
+from headless.studies.benchmark.resource_usage import Expense
 
 import numpy as np
 from matplotlib.ticker import LogFormatter
@@ -63,12 +65,20 @@ def choice_losses(path: Path, table: Placements) -> dict[str, IntervalEstimate]:
     ----------
     path : path
         File of the table, for messages.
+
+    Raises
+    ------
+    SeipError
+        The table lacks average precision by halves of the runs, coverage or returns.
     """
     columns = {key: criterion_column(path, table, key) for key in CRITERIA}
     lost: dict[str, list[float]] = {}
     for site, rows in table.items():
         parts = [_mean_precision(path, rows, half) for half in (0, 1)]
         values = {key: column[site] for key, column in columns.items() if site in column}
+        missing = next((key for key in SHORTLISTS if key not in values), None)
+        if missing is not None:
+            raise SeipError(f"{path} has no values of {missing} at {site}: build the benchmark again")
         default = int(np.argmax(values[DEFAULT]))
         for name, pool in _pools(values).items():
             losses = [
@@ -105,18 +115,24 @@ def _mean_precision(path: Path, rows: Sequence[Mapping[str, str]], half: int) ->
 
 
 def measure_seconds(scene: Path, sensor: str, count: int) -> dict[str, float]:
-    """Return the processor seconds of `seip place` for each of its choices at a site, everything computed anew."""
+    """Return the processor seconds of `seip place` for each of its choices at a site, everything computed anew.
+
+    Raises
+    ------
+    SeipError
+        A placement failed.
+    """
     seconds = {}
     for name, options in TIMED.items():
         with tempfile.TemporaryDirectory() as folder:
             sensors = ("--sensor", sensor, "--count", str(count), "--no-render")
             command = [sys.executable, "-m", "headless", "place", str(scene), *sensors, *options, "-o", folder]
-            before = resource.getrusage(resource.RUSAGE_CHILDREN)
-            done = subprocess.run(command, capture_output=True, text=True, check=False)  # noqa: S603 -- our own command
-            after = resource.getrusage(resource.RUSAGE_CHILDREN)
-            seconds[name] = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+            expense = Expense()
+            done = expense.time(partial(subprocess.run, command, capture_output=True, text=True, check=False))
             if done.returncode:
-                raise SeipError(f"seip place {' '.join(options)} failed: {done.stderr.strip().splitlines()[-1]}")
+                said = done.stderr.strip() or f"exit status {done.returncode}"
+                raise SeipError(f"seip place {' '.join(options)} failed: {said.splitlines()[-1]}")
+        seconds[name] = expense.cpu
     return seconds
 
 

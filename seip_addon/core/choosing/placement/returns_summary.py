@@ -15,9 +15,9 @@ GOOD_SHARE, FAIR_SHARE = 0.95, 0.8
 """Shares of the places with enough returns from which a placement is called good, and fair."""
 
 NOT_BY_DETECTION = (
-    "the criterion is expected returns, not detection: at ten junctions the average precision of a detector with its "
-    "best placement was 2 points lower for vehicles, 6 for two-wheelers and 5 for pedestrians than with the best of "
-    "about 106 placements; a choice among finalists by detection measures it here"
+    "the criterion is expected returns, not detection: at ten junctions with two OS1-128 the average precision of a "
+    "detector with its best placement was 2 points lower for vehicles, 6 for two-wheelers and 5 for pedestrians than "
+    "with the best of about 106 placements; a choice among finalists by detection measures it here"
 )
 """Note on placements for returns that no detector has judged; docs/open-benchmark.md has its figures."""
 
