@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Mapping, Sequence
+from html import escape
 from xml.etree import ElementTree as ET
 
 import shapely
@@ -35,7 +36,7 @@ def save_kml(path: str | os.PathLike[str], placed: Located) -> None:
     document = ET.SubElement(root, "Document")
     _text(document, "name", placed.site.name)
     if placed.site.attribution:
-        _text(document, "description", "\n".join(placed.site.attribution))
+        _description(document, "\n".join(placed.site.attribution))
     for name, look in STYLES.items():
         _style(document, name, *look)
     sensors = _folder(document, "Sensors")
@@ -58,7 +59,7 @@ def save_kml(path: str | os.PathLike[str], placed: Located) -> None:
 def _sensor(folder: ET.Element, sensor: Sensor, longitude: float, latitude: float) -> None:
     placemark = ET.SubElement(folder, "Placemark")
     _text(placemark, "name", sensor.label)
-    _text(placemark, "description", f"{sensor.model.name}, {sensor.height:.2f} m above the ground{sensor.turned}")
+    _description(placemark, f"{sensor.model.name}, {sensor.height:.2f} m above the ground{sensor.turned}")
     data = {
         "sensor": sensor.model.key,
         "position": sensor.position_name,
@@ -116,6 +117,11 @@ def _data(placemark: ET.Element, values: Mapping[str, str]) -> None:
     extended = ET.SubElement(placemark, "ExtendedData")
     for name, value in values.items():
         _text(ET.SubElement(extended, "Data", {"name": name}), "value", value)
+
+
+def _description(parent: ET.Element, text: str) -> None:
+    """Add a text that viewers show as HTML."""
+    _text(parent, "description", escape(text, quote=False))
 
 
 def _text(parent: ET.Element, tag: str, text: str) -> None:
