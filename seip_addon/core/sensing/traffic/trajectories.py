@@ -292,7 +292,7 @@ def is_shape(values: Sequence[object]) -> bool:
 def _check(run: Trajectories) -> None:
     """Raise ValueError if shapes contradict each other, or a number is not plausible or out of order."""
     samples = len(run.time)
-    shapes = {name: (samples,) for name in SAMPLED} | {"position": (samples, 3), "origin": (3,)}
+    shapes = dict.fromkeys(SAMPLED, (samples,)) | {"position": (samples, 3), "origin": (3,)}
     shapes |= {"first": (len(run.users) + 1,)}
     wrong = [name for name, shape in shapes.items() if getattr(run, name).shape != shape]
     if wrong or run.first[0] != 0 or run.first[-1] != samples or (np.diff(run.first) < 1).any():

@@ -104,7 +104,9 @@ def test_kml_is_xml_with_the_same_content(example, placed, features, tmp_path):
     root = ET.parse(tmp_path / "placement.kml").getroot()  # noqa: S314  # our own
     assert root.tag == f"{{{NAMESPACE}}}kml"
     assert root.find("k:Document/k:name", NAMES).text == "Crossing <b> & �"
-    assert root.find("k:Document/k:description", NAMES).text == "© &lt;i&gt;Town&lt;/i&gt;"  # which viewers show as HTML
+    assert (
+        root.find("k:Document/k:description", NAMES).text == "© &lt;i&gt;Town&lt;/i&gt;"
+    )  # which viewers show as HTML
     sensors, areas, coverage = root.findall("k:Document/k:Folder", NAMES)
     for mark, sensor in zip(sensors.findall("k:Placemark", NAMES), example.deployment.sensors, strict=True):
         assert mark.find("k:Point/k:altitudeMode", NAMES).text == "relativeToGround"

@@ -180,7 +180,11 @@ CAR_1 = RUN.users[0]
 @pytest.mark.parametrize(
     "changes",
     [
-        *({name: np.full_like(getattr(RUN, name), wrong)} for name in (*SAMPLED, "origin") for wrong in (np.nan, 1e300)),
+        *(
+            {name: np.full_like(getattr(RUN, name), wrong)}
+            for name in (*SAMPLED, "origin")
+            for wrong in (np.nan, 1e300)
+        ),
         {"time": RUN.time[:-1]},
         {"time": RUN.time[[1, 0, 2]]},
         {"position": RUN.position[:, :2]},
