@@ -307,6 +307,8 @@ def _check(run: Trajectories) -> None:
         "a size": (np.array(sizes, dtype=np.float64), ROAD_USER_SIZE),
         "a paint": (np.array([user.paint for user in run.users], dtype=np.float64), SHARE),
     }
-    known = all(user.category in CATEGORIES and is_shape(user.shape) for user in run.users)
+    known = all(
+        isinstance(user.name, str) and user.category in CATEGORIES and is_shape(user.shape) for user in run.users
+    )
     if (fault := Limits.first_fault(numbers)) or (steps <= 0.0).any() or not known:
         raise ValueError(fault or "times do not increase, or a road user is of no known kind")

@@ -194,6 +194,7 @@ CAR_1 = RUN.users[0]
         {"first": np.array([1, 2, 3])},
         *({"users": (replace(CAR_1, **{name: 1e300}), CAR_1)} for name in ("length", "width", "height", "paint")),
         {"users": (replace(CAR_1, category="boat"), CAR_1)},
+        {"users": (replace(CAR_1, name=7), CAR_1)},
         {"users": (replace(CAR_1, shape=(0.5, 0.5, 0.0, 0.0)), CAR_1)},
     ],
 )
