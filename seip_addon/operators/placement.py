@@ -106,7 +106,7 @@ class SEIP_OT_judge_placement(Conditional, _Placing, bpy.types.Operator):
     """Place sensors, and choose among twelve good placements by what a detector finds with them in runs of traffic; runs in a separate Python with PyTorch"""  # noqa: E501  # a tooltip is one line
 
     bl_idname = "seip.judge_placement"
-    bl_label = "Judge by Detection"
+    bl_label = "Choose by Detection"
 
     obstacles = (scene_status.obstacle, no_python)
 

@@ -28,7 +28,7 @@ class SEIP_OT_add_catalogue(Conditional, ShortWork, bpy.types.Operator):
     obstacles = (_no_preferences,)
 
     filepath: bpy.props.StringProperty(
-        name="File", description="The catalogue", subtype="FILE_PATH", options={"PATH_SUPPORTS_BLEND_RELATIVE"}
+        name="File", description="Catalogue file", subtype="FILE_PATH", options={"PATH_SUPPORTS_BLEND_RELATIVE"}
     )
     filter_glob: bpy.props.StringProperty(default="*.toml;*.json;*.xml;*.yaml;*.yml;*.csv", options={"HIDDEN"})
 

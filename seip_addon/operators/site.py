@@ -64,7 +64,7 @@ class SEIP_OT_choose_map(_WritesScene, LongWork[SitePlaces], bpy.types.Operator)
 
     filepath: bpy.props.StringProperty(
         name="File",
-        description="The map, extract or site description",
+        description="Map, extract or site description",
         subtype="FILE_PATH",
         options={"SKIP_SAVE", "PATH_SUPPORTS_BLEND_RELATIVE"},
     )
@@ -213,7 +213,7 @@ class _BuildsSite(_WritesScene, LongWork[BuiltSite]):
 
 
 class SEIP_OT_build_site(_BuildsSite, bpy.types.Operator):
-    """Model the chosen place of the map: in this scene with its camera, light and units. A site of the same place is replaced, your own objects stay; a site of another place stays, and a new scene of this file is made. Blender's cube, light and camera are removed where they are all that the scene holds"""  # noqa: E501  # a tooltip is one line
+    """Build a model of the chosen place, with camera, light and units. It replaces an earlier site of the same place; your own objects stay. If this scene has a site of another place, a new scene is made. Blender's default cube, light and camera are removed if the scene holds nothing else"""  # noqa: E501  # a tooltip is one line
 
     bl_idname = "seip.build_site"
     bl_label = "Build Site"
@@ -322,7 +322,7 @@ class SEIP_OT_add_area(_WritesScene, bpy.types.Operator):
         name="Place",
         description="Position of the area",
         items=(
-            ("VIEW", "View", "In the middle of the view, as large as most of it, at the height of the 3D cursor"),
+            ("VIEW", "View", "Middle of the view, at the height of the 3D cursor, sized to the view"),
             ("CURSOR", "3D Cursor", "At the 3D cursor"),
         ),
         default="CURSOR",
@@ -336,10 +336,10 @@ class SEIP_OT_add_area(_WritesScene, bpy.types.Operator):
         min=0.1,
         soft_max=500.0,
     )
-    turn: bpy.props.FloatProperty(name="Rotation", description="Angle, counter-clockwise", subtype="ANGLE")
+    turn: bpy.props.FloatProperty(name="Rotation", description="Counter-clockwise angle", subtype="ANGLE")
     corners: bpy.props.IntProperty(
         name="Corners",
-        description="Four for a rectangle, more for an ellipse",
+        description="Number of corners: 4 for a rectangle, more for an ellipse",
         default=4,
         min=3,
         soft_max=32,

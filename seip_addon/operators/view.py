@@ -30,7 +30,7 @@ NO_COVERAGE = "There is no coverage to show: place sensors first."
 
 
 def why_no_coverage(scene: bpy.types.Scene) -> str:
-    """Return why coverage cannot be coloured; nothing where it can."""
+    """Return why coverage cannot be coloured, or ""."""
     return NO_COVERAGE if coverage_of(scene) is None else ""
 
 
@@ -45,10 +45,10 @@ class SEIP_OT_colour_coverage(Conditional, bpy.types.Operator):
         name="Show",
         description="Meaning of the road's colours",
         items=(
-            ("returns", "Returns", "Expected returns from a pedestrian there, where sensors were placed for returns"),
-            ("seen", "Seen", "Whether any sensor measures the surface of the road"),
-            ("times", "Sensors", "How many sensors measure the surface of the road"),
-            ("weights", "Weights", "Weight of each part of the road, where regions are weighted"),
+            ("returns", "Returns", "Expected returns from a pedestrian, if sensors were placed for returns"),
+            ("seen", "Seen", "Road surface that some sensor measures"),
+            ("times", "Sensors", "Number of sensors that measure the road surface"),
+            ("weights", "Weights", "Weight of each part of the road, if regions are weighted"),
         ),
         default="times",
     )
@@ -112,7 +112,7 @@ class SEIP_OT_hide_overlay(bpy.types.Operator):
     bl_idname = "seip.hide_overlay"
     bl_label = "Hide"
 
-    name: bpy.props.StringProperty(name="Name", description="Name of what is drawn over the view")
+    name: bpy.props.StringProperty(name="Name", description="Name of the overlay")
 
     def execute(self, context: bpy.types.Context) -> Outcome:
         """Hide it; a point cloud is forgotten, as it would be shown again in other colours."""

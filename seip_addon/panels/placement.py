@@ -17,6 +17,7 @@ from ..core.output.results.placement_file import parsed_record
 from ..core.output.results.placement_record import PlacementRecord, relevant_warnings
 from ..core.site.obstruction import NO_OBSTACLES_MESSAGE
 from ..core.workflows.traffic_runs import traffic_folder
+from ..operators.detection import no_python
 from ..operators.results import no_placement
 from ..operators.sensors import SEIP_MT_survey_presets
 from ..scene.sensors import labelled_sensors
@@ -98,7 +99,8 @@ def draw(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     elif scene_status.has_unevaluated(scene):
         draw_sentence(layout, scene_status.UNEVALUATED, icon="INFO")
         draw_run(layout, "seip.evaluate_sensors")
-    draw_run(layout, "seip.judge_placement")
+    if not no_python(scene):
+        draw_run(layout, "seip.judge_placement")
     draw_sections(
         layout,
         {
@@ -190,7 +192,7 @@ def _draw_search(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
 
 
 def _draw_answer(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
-    """Draw the answer in three lines and its details, dimmed while it is not of the scene as it is."""
+    """Draw the answer in three lines and its details, after the reasons why it is not of the scene as it is."""
     record = parsed_record(scene.seip.result.record)
     box = layout.box()
     doubts = _doubts(scene)
@@ -205,22 +207,18 @@ def _draw_answer(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
     if other_goal:
         draw_sentence(box, other_goal, icon="INFO", reserved=BOX)
     column = box.column()
-    column.active = not doubts
+    if doubts:  # dimmed text could not be read in a light theme
+        draw_sentence(column, "Figures of the last placement:", reserved=BOX)
     if scene.seip.result.change:
         draw_sentence(column, scene.seip.result.change, icon="INFO", reserved=BOX)
-    if doubts and record.judgement is not None:
-        draw_sentence(column, "The AP is that of the earlier poses.", icon="INFO", reserved=BOX)
     for text in answer(record):
         draw_sentence(column, text, reserved=BOX)
-    others = {"numbers": partial(_draw_numbers, goal=scene.seip.goal, certain=not doubts)} if numbers(record) else {}
+    others = {"numbers": partial(_draw_numbers, goal=scene.seip.goal)} if numbers(record) else {}
     draw_sections(box, {**others, "details": partial(_draw_details, certain=not doubts)}, record)
 
 
-def _draw_numbers(
-    layout: bpy.types.UILayout, record: PlacementRecord, *, goal: bpy.types.PropertyGroup, certain: bool
-) -> None:
+def _draw_numbers(layout: bpy.types.UILayout, record: PlacementRecord, *, goal: bpy.types.PropertyGroup) -> None:
     """Draw quality and price of the best placement of each number of sensors, with a button that chooses it."""
-    layout.active = certain
     column = layout.column(align=True)
     for count, share, text in numbers(record):
         row = column.split(factor=NUMBER_SHARE, align=True)
@@ -264,7 +262,6 @@ def front_text(record: PlacementRecord) -> str:
 
 def _draw_details(layout: bpy.types.UILayout, record: PlacementRecord, *, certain: bool) -> None:
     """Draw all figures by topic, the certificate while it holds, and the notes."""
-    layout.active = certain
     for topic, lines in figures(record).items():
         if not lines:
             continue

@@ -40,7 +40,8 @@ def status(scene: bpy.types.Scene) -> Status:
         return Status(result=("not checked", scene.name))
     targets = (f"{one.value.partition(', ')[0]} points" for one in site.counts if one.name == TARGETS)
     doubt = scene_status.stale_check(scene)
-    return Status(doubt not in {"", scene_status.OLD_CHECK}, (in_short(site.problems), *targets, scene.name))
+    changed = doubt not in {"", scene_status.OLD_CHECK, scene_status.OTHER_SENSORS}
+    return Status(changed, (in_short(site.problems), *targets, scene.name))
 
 
 def draw(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
@@ -144,7 +145,7 @@ def _draw_place(layout: bpy.types.UILayout, site: SEIP_PG_site) -> None:
     shape = size.row()
     shape.enabled = bool(site.junction) or site.is_extract()
     shape.prop(site, "region_shape")
-    size.prop(site, "radius", text="Along Them" if site.follows_approaches() else "Radius")
+    size.prop(site, "radius", text="Along Streets" if site.follows_approaches() else "Radius")
 
 
 def _draw_sources(layout: bpy.types.UILayout, site: SEIP_PG_site) -> None:
@@ -161,15 +162,15 @@ def _draw_sources(layout: bpy.types.UILayout, site: SEIP_PG_site) -> None:
 def _place_text(site: SEIP_PG_site) -> str:
     """Return which place is chosen, or what is wrong with the choice."""
     if site.junction:
-        return "The place: this junction."
+        return "The site is at this junction."
     if site.is_described():
-        return "The description's own place."
+        return "The site is at the place that the description gives."
     if not site.is_extract():
-        return "The middle of the map."
+        return "The site is in the middle of the map."
     if not site.position:
-        return "No place is chosen yet."
+        return "Choose a junction, or enter a position."
     wrong = site.wrong_position(site.position)
-    return f"{wrong}." if wrong else "The place: this position."
+    return f"{wrong}." if wrong else "The site is at this position."
 
 
 def _draw_check(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
@@ -180,7 +181,7 @@ def _draw_check(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
         return
     doubt = scene_status.stale_check(scene)
     if doubt:
-        draw_sentence(layout, doubt, icon="ERROR")
+        draw_sentence(layout, doubt, icon="INFO" if doubt == scene_status.OTHER_SENSORS else "ERROR")
     elif not site.problems:
         draw_sentence(layout, "The site is sound.", icon="CHECKMARK")
     else:

@@ -123,8 +123,6 @@ def _draw_found(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
     column = box.column()
     if _detection_status(scene).changed:
         draw_sentence(column, OTHER_SENSORS, icon="ERROR", reserved=BOX)
-        column = box.column()
-        column.active = False
     table = column.column(align=True)
     for name, figure in figures(found):
         row = table.split(factor=0.42)

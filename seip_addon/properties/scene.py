@@ -21,7 +21,7 @@ class SEIP_PG_chosen(bpy.types.PropertyGroup):
 
 
 class SEIP_PG_placement(bpy.types.PropertyGroup):
-    """A placement: enough to find all about it again from the scene and the visibility kept in the cache."""
+    """Stored placement; the rest is recomputed from the scene and the cached visibility."""
 
     record: StringProperty(name="Record", description="Placement as in placement.json")
     targets: StringProperty(name="Targets", description="Digest of the placement's targets")
@@ -29,7 +29,7 @@ class SEIP_PG_placement(bpy.types.PropertyGroup):
 
 
 class SEIP_PG_result(SEIP_PG_placement):
-    """The placement that stands in the scene, and what is looked at of it."""
+    """Current placement and its display settings."""
 
     change: StringProperty(name="Change", description="Difference from the placement before")
     sensors: CollectionProperty(type=SEIP_PG_chosen)
@@ -104,9 +104,9 @@ class SEIP_PG_view(bpy.types.PropertyGroup):
         name="Point Colours",
         description="Meaning of the point cloud's colours",
         items=(
-            ("sensor", "Sensor", "Which sensor measured the point"),
-            ("intensity", "Intensity", "How strong the return is"),
-            ("instance", "Road User", "Which road user returned it"),
+            ("sensor", "Sensor", "Sensor that measured the point"),
+            ("intensity", "Intensity", "Intensity of the return"),
+            ("instance", "Road User", "Road user that the point is on"),
         ),
         update=_recolour,
     )
