@@ -59,9 +59,11 @@ def list_types(scene: bpy.types.Scene) -> None:
 
 @bpy.app.handlers.persistent  # type: ignore[untyped-decorator]
 def _after_load(*_: object) -> None:
-    """List the types; where a command has placed sensors, use their types if none of them was chosen."""
+    """List the types, and take over placements of commands; without a record use the types of the sensors."""
     refresh()
     for scene in bpy.data.scenes:
+        if scene.library is None:
+            scene.seip.take_over_placement()
         if scene.library is None and scene_status.has_unevaluated(scene):
             there = {obj.get(contract.SENSOR) for obj in labelled_sensors(scene, hidden=True).values()}
             if not there & set(scene.seip.survey.used_types()):
@@ -73,14 +75,14 @@ def attach() -> None:
     """List the types now, and whenever a file is opened."""
     bpy.app.handlers.load_post.append(_after_load)
     if isinstance(bpy.data, bpy.types.BlendData):
-        refresh()
+        _after_load()
     else:  # Blender lets nobody look at the open file while it registers an add-on
-        bpy.app.timers.register(refresh, first_interval=0.0)
+        bpy.app.timers.register(_after_load, first_interval=0.0)
 
 
 def detach() -> None:
     """Forget them."""
-    if bpy.app.timers.is_registered(refresh):
-        bpy.app.timers.unregister(refresh)
+    if bpy.app.timers.is_registered(_after_load):
+        bpy.app.timers.unregister(_after_load)
     bpy.app.handlers.load_post.remove(_after_load)
     session.sensor_types.clear()

@@ -252,10 +252,6 @@ def _set_up(finding: Generator[Progress, None, SceneState]) -> Generator[Progres
     return state, visibility, SensorReturns(state.layout, solution.objective) if of_returns else None
 
 
-def _nothing_to_evaluate(scene: bpy.types.Scene) -> str:
-    return "" if scene_status.has_unevaluated(scene) else no_placement(scene)
-
-
 class SEIP_OT_evaluate_sensors(ForReadyScene, LongWork[SceneState], bpy.types.Operator):
     """Evaluate the sensors of the scene at their present poses, and make them the placement"""
 
@@ -304,12 +300,7 @@ def keep_result(scene: bpy.types.Scene, state: SceneState, record: PlacementReco
     live_coverage.stop()
     kept = scene.seip.result
     kept.change = "" if no_placement(scene) else change_text(record, parsed_record(kept.record))
-    kept.record = record.text()
-    kept.targets = digest(survey.site.targets.xyz)
-    kept.seen = packed_counts(solution.deployment.seen_by)
-    kept.sensors.clear()
-    for sensor in solution.deployment.sensors:
-        kept.sensors.add().name = sensor.label
+    kept.keep(record.text(), digest(survey.site.targets.xyz), packed_counts(solution.deployment.seen_by))
     bpy.context.window_manager.seip_sections.follow_steps()
     session.of(scene).state = replace(state, record=kept.record)
 

@@ -6,6 +6,9 @@ import bpy
 from bpy.props import BoolProperty, CollectionProperty, EnumProperty, IntProperty, PointerProperty, StringProperty
 
 from .. import last_scan, selection
+from ..core.errors import SeipError
+from ..core.output.results.placement_file import parsed_record
+from ..scene import contract
 from ..scene_status import FILE_VERSION
 from ..viewport import coverage
 from .conversion import path_property
@@ -46,6 +49,13 @@ class SEIP_PG_result(SEIP_PG_placement):
         description="Add a rendered view of the scene to the files and the report, which takes a minute",
         default=False,
     )
+
+    def keep(self, record: str, targets: str, seen: str) -> None:
+        """Keep a placement as the current one, with a row for each of its sensors."""
+        self.record, self.targets, self.seen = record, targets, seen
+        self.sensors.clear()
+        for sensor in parsed_record(record).sensors:
+            self.sensors.add().name = sensor.id
 
 
 class SEIP_PG_detection(bpy.types.PropertyGroup):
@@ -132,6 +142,21 @@ class SEIP_PG_scene(bpy.types.PropertyGroup):
     simulation: PointerProperty(type=SEIP_PG_simulation)
     detection: PointerProperty(type=SEIP_PG_detection)
     verification: PointerProperty(type=SEIP_PG_verification)
+
+    def take_over_placement(self) -> None:
+        """Take over the placement that a command has stored in the scene, and its settings, if there is one."""
+        scene = self.id_data
+        stored = scene.get(contract.PLACEMENT)
+        if stored is None:
+            return
+        try:
+            request = parsed_record(stored["record"]).request
+        except SeipError:  # of a newer version: the sensors can still be evaluated
+            return
+        self.result.keep(*(stored[name] for name in ("record", "targets", "seen")))
+        self.survey.take_over(request)
+        self.goal.take_over(request.goal)
+        del scene[contract.PLACEMENT]
 
 
 def attach() -> None:
