@@ -18,10 +18,10 @@ PARTS = (
     "operators.verification",
     "panels.sensors", "panels.site", "panels.placement", "panels.results", "panels.steps", "panels.front_door",
 )  # fmt: skip
-"""Modules of the add-on; most have ``CLASSES``.
+"""Modules of the add-on, whose classes are registered in the order of their definition.
 
-Some have ``attach`` and ``detach`` for what is no class: handlers, properties,
-menus; and some ``forget``, for what must not outlive the open file.
+Some have ``attach`` and ``detach`` for handlers, properties and menus, and some ``forget``, for what must not outlive
+the open file.
 """
 
 _registered: list[ModuleType] = []
@@ -34,7 +34,7 @@ def register() -> None:
     except ImportError as error:
         parts = [_incomplete(error)]
     for part in parts:
-        for one in getattr(part, "CLASSES", ()):
+        for one in _classes(part):
             bpy.utils.register_class(one)
         _registered.append(part)
         if hasattr(part, "attach"):
@@ -50,8 +50,14 @@ def unregister() -> None:
         part = _registered.pop()
         if hasattr(part, "detach"):
             part.detach()
-        for one in reversed(getattr(part, "CLASSES", ())):
+        for one in reversed(_classes(part)):
             bpy.utils.unregister_class(one)
+
+
+def _classes(part: ModuleType) -> list[type]:
+    """Return the classes for Blender that a module defines, in order."""
+    own = (one for one in vars(part).values() if isinstance(one, type) and one.__module__ == part.__name__)
+    return [one for one in own if issubclass(one, bpy.types.bpy_struct)]
 
 
 @bpy.app.handlers.persistent  # type: ignore[untyped-decorator]

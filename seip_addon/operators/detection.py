@@ -104,6 +104,3 @@ def folder_of_result(folder: Path) -> Iterator[None]:
         with suppress(OSError):  # it holds something
             for one in new:
                 one.rmdir()
-
-
-CLASSES = (SEIP_OT_detect,)

@@ -205,13 +205,3 @@ class SEIP_OT_add_rule(ShortWork, bpy.types.Operator):
         entry.name, entry.rule = name, rule
         goal.active_rule = goal.rules.find(name)
         goal.position = ""
-
-
-CLASSES = (
-    SEIP_OT_compute_visibility,
-    SEIP_OT_compare_scene,
-    SEIP_OT_solve_placement,
-    SEIP_OT_judge_placement,
-    SEIP_OT_choose_number,
-    SEIP_OT_add_rule,
-)

@@ -422,15 +422,3 @@ def _holds(folder: Path, record: str, _written: int | None) -> bool:
     # The goal is compared too: with other shares of the road users, the same sensors have another value in the files.
     one, other = ((of.sensors, of.inputs, of.notes, of.request.goal) for of in (written, present))
     return one == other
-
-
-CLASSES = (
-    SEIP_OT_look_from_sensor,
-    SEIP_OT_keep_placement,
-    SEIP_OT_remove_entry,
-    SEIP_OT_show_comparison,
-    SEIP_OT_follow_sensors,
-    SEIP_OT_evaluate_sensors,
-    SEIP_OT_export_result,
-    SEIP_OT_write_report,
-)

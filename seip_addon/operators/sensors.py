@@ -120,13 +120,3 @@ class SEIP_OT_add_survey_preset(AddPresetBase, bpy.types.Operator):
     preset_subdir = "seip/survey"
     preset_defines = ("survey = bpy.context.scene.seip.survey",)
     preset_values = ("survey",)
-
-
-CLASSES = (
-    SEIP_OT_add_catalogue,
-    SEIP_OT_remove_catalogue,
-    SEIP_OT_empty_cache,
-    SEIP_OT_preview_beams,
-    SEIP_MT_survey_presets,
-    SEIP_OT_add_survey_preset,
-)

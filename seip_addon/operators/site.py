@@ -477,15 +477,3 @@ def _frame_selected(context: bpy.types.Context) -> None:
     region = next(region for region in area.regions if region.type == "WINDOW")
     with context.temp_override(region=region):
         bpy.ops.view3d.view_selected()
-
-
-CLASSES = (
-    SEIP_OT_choose_map,
-    SEIP_OT_download_map,
-    SEIP_OT_build_site,
-    SEIP_OT_load_example,
-    SEIP_OT_assign_role,
-    SEIP_OT_add_area,
-    SEIP_OT_check_site,
-    SEIP_OT_show_problem,
-)

@@ -103,6 +103,3 @@ def viewport_of(window: bpy.types.Window | None) -> bpy.types.Area | None:
     """Return the largest 3D viewport of a window, or None."""
     areas = [] if window is None else [area for area in window.screen.areas if area.type == "VIEW_3D"]
     return max(areas, key=lambda area: area.width * area.height, default=None)
-
-
-CLASSES = (SEIP_OT_pick_junction,)

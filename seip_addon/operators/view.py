@@ -196,11 +196,3 @@ def _free(path: Path) -> Path:
     """Return the name, with the first number that is free where there is a picture of that name."""
     numbered = (path.with_stem(f"{path.stem}-{number}") for number in count(2))
     return next(name for name in chain([path], numbered) if not name.exists())
-
-
-CLASSES = (
-    SEIP_OT_colour_coverage,
-    SEIP_OT_show_sight_lines,
-    SEIP_OT_save_picture,
-    SEIP_OT_hide_overlay,
-)

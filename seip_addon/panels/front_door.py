@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import bpy
 
-from ..operators.site import (
-    EXTRACTS,
-)
+from ..operators.site import EXTRACTS
 
 OPENDRIVE = "*.xodr"
 
@@ -84,7 +82,6 @@ def draw_object(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
 
 
 MENUS = (("TOPBAR_MT_file_import", draw_import), ("VIEW3D_MT_add", draw_add), ("VIEW3D_MT_object", draw_object))
-CLASSES = (SEIP_FH_opendrive, SEIP_FH_openstreetmap, SEIP_MT_main)
 
 
 def attach() -> None:

@@ -307,6 +307,3 @@ def figures(record: PlacementRecord) -> dict[str, list[tuple[str, str]]]:
 def _warnings(record: PlacementRecord) -> list[str]:
     """Return the warnings about the site; those about a sensor type are shown with the type."""
     return relevant_warnings(record.warnings, record.request.candidates.sensors, ())
-
-
-CLASSES = (SEIP_UL_rules,)

@@ -72,6 +72,3 @@ class SEIP_AP_preferences(bpy.types.AddonPreferences):
             row.prop(file, "path", text="")
             row.operator("seip.remove_catalogue", text="", icon="X").index = number
         layout.operator("seip.add_catalogue", icon="ADD")
-
-
-CLASSES = (SEIP_PG_catalogue_file, SEIP_AP_preferences)

@@ -13,9 +13,7 @@ from ..core.output.results.placement_record import PlacementRecord
 from ..core.sensing.lidar.model import short_name
 from ..operators import results
 from ..operators.results import no_placement
-from ..operators.view import (
-    why_no_coverage,
-)
+from ..operators.view import why_no_coverage
 from ..scene.write import ASPECT, aspects_of, coverage_of
 from ..session import FollowedSensors, session
 from ..viewport import coverage, overlays
@@ -239,6 +237,3 @@ def _returns(record: PlacementRecord) -> str:
 
 def _share(value: float | None) -> str:
     return "–" if value is None else f"{value:.2%}"
-
-
-CLASSES = (SEIP_UL_chosen, SEIP_UL_kept)

@@ -259,6 +259,3 @@ def _draw_beams(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     draw_sentence(layout, "Orange: more; road between may go unseen", icon="COLORSET_02_VEC")
     before = " in front" if preview.tilt else ""
     draw_sentence(layout, f"A level road{before} has no gaps up to {preview.resolved_to():.0f} m.")
-
-
-CLASSES = (SEIP_OT_choose_sensors,)

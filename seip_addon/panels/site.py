@@ -7,13 +7,7 @@ import bpy
 from .. import preferences, scene_status
 from ..core.site.roles import Role
 from ..operators.base import Outcome
-from ..operators.site import (
-    SEIP_OT_build_site,
-    has_site,
-    in_short,
-    is_of_choice,
-    missing_for_build,
-)
+from ..operators.site import SEIP_OT_build_site, has_site, in_short, is_of_choice, missing_for_build
 from ..properties.site import SEIP_PG_site
 from ..scene import roles
 from . import sumo
@@ -233,6 +227,3 @@ def _draw_object(layout: bpy.types.UILayout, scene: bpy.types.Scene, obj: bpy.ty
         column.prop(obj, "seip_region_weight")
     if Role.POLES in assigned:
         column.prop(obj, "seip_pole_rule")
-
-
-CLASSES = (SEIP_OT_choose_place,)

@@ -175,6 +175,3 @@ class SEIP_PG_goal(bpy.types.PropertyGroup):
         if self.weighting == "SCENE":
             return "scene"
         return as_typed(self.central_weight) if self.weighting == "VALUE" else None
-
-
-CLASSES = (SEIP_PG_position_rule, SEIP_PG_goal)

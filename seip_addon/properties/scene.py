@@ -167,14 +167,3 @@ def attach() -> None:
 def detach() -> None:
     """Take them away."""
     del bpy.types.Scene.seip
-
-
-CLASSES = (
-    SEIP_PG_chosen,
-    SEIP_PG_placement,
-    SEIP_PG_result,
-    SEIP_PG_detection,
-    SEIP_PG_verification,
-    SEIP_PG_view,
-    SEIP_PG_scene,
-)

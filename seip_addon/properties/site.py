@@ -6,13 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import bpy
-from bpy.props import (
-    BoolProperty,
-    CollectionProperty,
-    EnumProperty,
-    FloatProperty,
-    StringProperty,
-)
+from bpy.props import BoolProperty, CollectionProperty, EnumProperty, FloatProperty, StringProperty
 
 from ..core.errors import SeipError
 from ..core.site.scene_geometry import DEFAULT_WEIGHT
@@ -175,9 +169,6 @@ def _set_pole_rule(obj: bpy.types.Object, value: int) -> None:
             obj[mark] = True
         elif mark in obj:
             del obj[mark]
-
-
-CLASSES = (SEIP_PG_junction, SEIP_PG_count, SEIP_PG_problem, SEIP_PG_site)
 
 
 def attach() -> None:

@@ -192,6 +192,3 @@ def _complaint(read: Callable[[], object]) -> str:
     except SeipError as error:
         return str(error)
     return ""
-
-
-CLASSES = (SEIP_PG_sensor_type, SEIP_PG_survey)
