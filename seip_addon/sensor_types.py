@@ -71,18 +71,5 @@ def _after_load(*_: object) -> None:
                     one.use = one.name in there
 
 
-def attach() -> None:
-    """List the types now, and whenever a file is opened."""
-    bpy.app.handlers.load_post.append(_after_load)
-    if isinstance(bpy.data, bpy.types.BlendData):
-        _after_load()
-    else:  # Blender lets nobody look at the open file while it registers an add-on
-        bpy.app.timers.register(_after_load, first_interval=0.0)
-
-
-def detach() -> None:
-    """Forget them."""
-    if bpy.app.timers.is_registered(_after_load):
-        bpy.app.timers.unregister(_after_load)
-    bpy.app.handlers.load_post.remove(_after_load)
-    session.sensor_types.clear()
+HANDLERS = (("load_post", _after_load),)
+AT_START = (_after_load,)

@@ -277,10 +277,7 @@ class SEIP_OT_evaluate_sensors(ForReadyScene, LongWork[SceneState], bpy.types.Op
         """Make the sensors at their present poses the placement."""
         survey, solution = result.placed()
         take_over(scene, survey.site, solution.deployment, labelled_sensors(scene, hidden=True))
-        provenance = Provenance(datetime.now(UTC), result.durations, versions(blender=bpy.app.version_string))
-        record = record_of(survey, solution, provenance)
-        keep_result(scene, result, record)
-        self.report({"INFO"}, answer(record)[0])
+        self.report({"INFO"}, answer(keep_result(scene, result))[0])
 
 
 def _evaluated(
@@ -294,15 +291,18 @@ def _evaluated(
     return replace(state, solution=solution)
 
 
-def keep_result(scene: bpy.types.Scene, state: SceneState, record: PlacementRecord) -> None:
-    """Have the scene keep a placement that stands in it, all that is needed to go on later included."""
+def keep_result(scene: bpy.types.Scene, state: SceneState) -> PlacementRecord:
+    """Store the placement whose sensors are in the scene, with all that is needed to go on later; return its record."""
     survey, solution = state.placed()
+    provenance = Provenance(datetime.now(UTC), state.durations, versions(blender=bpy.app.version_string))
+    record = record_of(survey, solution, provenance)
     live_coverage.stop()
     kept = scene.seip.result
     kept.change = "" if no_placement(scene) else change_text(record, parsed_record(kept.record))
     kept.keep(record.text(), digest(survey.site.targets.xyz), packed_counts(solution.deployment.seen_by))
     bpy.context.window_manager.seip_sections.follow_steps()
     session.of(scene).state = replace(state, record=kept.record)
+    return record
 
 
 class _Writes(ForPlacement, LongWork[Result]):

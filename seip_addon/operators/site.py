@@ -7,7 +7,7 @@ from pathlib import Path
 
 import bpy
 
-from .. import preferences, scene_status, sensor_types
+from .. import preferences, scene_status, selection, sensor_types
 from ..core.counts import counted
 from ..core.errors import SeipError
 from ..core.output.results.answer import sentence
@@ -268,9 +268,8 @@ def _bring_to_front(scene: bpy.types.Scene) -> None:
     if window is None:
         return
     window.scene = scene
-    for area in window.screen.areas:
-        if area.type == "VIEW_3D":
-            frame_site(area, scene)
+    for area in overlays.viewports([window]):
+        frame_site(area, scene)
     overlays.open_sidebar(window)
 
 
@@ -366,7 +365,7 @@ class SEIP_OT_add_area(_WritesScene, bpy.types.Operator):
         if self.place == "VIEW" and context.region_data is not None:
             middle.xy = context.region_data.view_location.xy
         obj = roles.add_area(context.scene, Role[self.role], tuple(middle), tuple(self.size), self.turn, self.corners)
-        _select_alone(context, obj)
+        selection.select_alone(context, obj)
         return {"FINISHED"}
 
 
@@ -442,7 +441,7 @@ class SEIP_OT_show_problem(ShortWork, bpy.types.Operator):
         if obstacle:
             raise SeipError(obstacle)
         obj = context.view_layer.objects[context.scene.seip.site.problems[self.number].name]
-        _select_alone(context, obj)
+        selection.select_alone(context, obj)
         _frame_selected(context)
 
 
@@ -460,13 +459,6 @@ def nothing_to_show(context: bpy.types.Context, number: int) -> str:
     if not obj.visible_get():
         return f"the object {name!r} is hidden: show it first"
     return "" if context.mode == "OBJECT" else "leave Edit Mode first"
-
-
-def _select_alone(context: bpy.types.Context, obj: bpy.types.Object) -> None:
-    for other in context.selected_objects:
-        other.select_set(state=False)
-    obj.select_set(state=True)
-    context.view_layer.objects.active = obj
 
 
 def _frame_selected(context: bpy.types.Context) -> None:

@@ -145,7 +145,7 @@ class SEIP_OT_save_picture(ForPlacement, LongWork[SceneState], bpy.types.Operato
         """Take the picture of a viewport."""
         session.of(scene).state = result
         area = getattr(self, "_area", None) or bpy.context.area
-        if bpy.app.background or area not in _viewports():
+        if bpy.app.background or area not in overlays.viewports(bpy.context.window_manager.windows):
             raise SeipError(
                 "there is no viewport here to take a picture of: press this in the sidebar of one, or export the files "
                 "with the rendered view"
@@ -175,12 +175,6 @@ def _save_sheet(path: Path, state: SceneState, view: Any) -> None:  # noqa: ANN4
         save_plan_view(drawn, survey.geometry, survey.site, solution.deployment, solution.caption)
         with Image.open(drawn) as picture:
             save_sheet(path, view, picture)
-
-
-def _viewports() -> list[bpy.types.Area]:
-    """Return the open 3D viewports: one may have been closed since the picture was requested."""
-    areas = (area for window in bpy.context.window_manager.windows for area in window.screen.areas)
-    return [area for area in areas if area.type == "VIEW_3D"]
 
 
 def _named(text: str) -> Path:

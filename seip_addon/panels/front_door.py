@@ -82,15 +82,3 @@ def draw_object(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
 
 
 MENUS = (("TOPBAR_MT_file_import", draw_import), ("VIEW3D_MT_add", draw_add), ("VIEW3D_MT_object", draw_object))
-
-
-def attach() -> None:
-    """Add to Blender's menus."""
-    for name, draw in MENUS:
-        getattr(bpy.types, name).append(draw)
-
-
-def detach() -> None:
-    """Take that away."""
-    for name, draw in MENUS:
-        getattr(bpy.types, name).remove(draw)

@@ -23,7 +23,7 @@ from ..operators.sensors import SEIP_MT_survey_presets
 from ..scene.sensors import labelled_sensors
 from ..sensor_edits import sensor_edits
 from .sections import BETWEEN, Status, draw_sections
-from .sidebar import RowList, draw_path, draw_run, is_narrow, settings_column
+from .sidebar import RowList, draw_path, draw_reason, draw_run, draw_settings, is_narrow, settings_column
 from .wrapped_text import BOX, draw_lines, draw_sentence, sidebar_width
 
 _SHOWN = {
@@ -76,8 +76,7 @@ def _doubts(scene: bpy.types.Scene) -> list[str]:
 def draw(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     """Draw the goal, the button and the answer, then the closed sections with all other settings."""
     scene = context.scene
-    if scene_status.has_nothing(scene):
-        draw_sentence(layout, scene_status.NO_SITE, icon="INFO")
+    if draw_reason(layout, scene_status.NO_SITE if scene_status.has_nothing(scene) else ""):
         return
     goal = scene.seip.goal
     column = settings_column(layout)
@@ -128,9 +127,7 @@ def button_text(scene: bpy.types.Scene) -> str:
 def _draw_objective(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
     """Draw the criterion and the settings of the chosen scenarios."""
     goal = scene.seip.goal
-    column = settings_column(layout)
-    column.prop(goal, "criterion")
-    column.prop(goal, "scenarios")
+    column = draw_settings(layout, goal, "criterion", "scenarios")
     if goal.scenarios == "traffic":
         draw_path(column, goal, "runs", placeholder=traffic_folder(Path(bpy.data.filepath)).name)
     for name in _SHOWN[goal.scenarios]:
@@ -176,19 +173,14 @@ def _draw_candidates(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None
         ("Price", ("installed",)),
     ):
         layout.label(text=heading)
-        group = settings_column(layout)
-        for name in names:
-            group.prop(survey, name)
+        draw_settings(layout, survey, *names)
     if survey.installed:
         draw_path(layout, survey, "installed_cost", placeholder="Shipped")
 
 
 def _draw_search(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
     """Draw the solver and its limit."""
-    survey = scene.seip.survey
-    column = settings_column(layout)
-    column.prop(survey, "solver")
-    column.prop(survey, "effort")
+    draw_settings(layout, scene.seip.survey, "solver", "effort")
 
 
 def _draw_answer(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:

@@ -12,7 +12,7 @@ from ..properties.site import SEIP_PG_site
 from ..scene import roles
 from . import sumo
 from .sections import Status, draw_sections
-from .sidebar import draw_path, draw_run, is_narrow, settings_column
+from .sidebar import draw_path, draw_reason, draw_run, draw_settings, is_narrow, settings_column
 from .wrapped_text import ICON, MARGIN, draw_lines, draw_sentence, wrapped
 
 TARGETS = "Targets"
@@ -148,9 +148,7 @@ def _draw_sources(layout: bpy.types.UILayout, site: SEIP_PG_site) -> None:
     row.enabled = not site.is_extract()  # which has its own buildings, trees and posts
     draw_path(row, site, "osm")
     draw_path(layout, site, "terrain")
-    row = settings_column(layout)
-    row.enabled = bool(site.terrain)
-    row.prop(site, "terrain_epsg")
+    draw_settings(layout, site, "terrain_epsg").enabled = bool(site.terrain)
 
 
 def _place_text(site: SEIP_PG_site) -> str:
@@ -192,8 +190,7 @@ def _draw_check(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
 
 def _draw_contents(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
     site = scene.seip.site
-    if not site.checked:
-        draw_sentence(layout, "Check the site to count its contents.", icon="INFO")
+    draw_reason(layout, "" if site.checked else "Check the site to count its contents.")
     for one in site.counts:
         draw_sentence(layout, f"{one.name}: {one.value}")
 
@@ -211,9 +208,7 @@ def _draw_roles(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
         for place, text in (("CURSOR", "Draw at Cursor"), ("VIEW", "Draw in View")):
             button = row.operator("seip.add_area", text=text)
             button.role, button.place = site.role, place
-    if context.object is None:
-        draw_sentence(layout, "Select objects to give them a role.", icon="INFO")
-    else:
+    if not draw_reason(layout, "" if context.object else "Select objects to give them a role."):
         _draw_object(layout, context.scene, context.object)
 
 

@@ -159,11 +159,4 @@ class SEIP_PG_scene(bpy.types.PropertyGroup):
         del scene[contract.PLACEMENT]
 
 
-def attach() -> None:
-    """Give every scene its properties."""
-    bpy.types.Scene.seip = PointerProperty(type=SEIP_PG_scene)
-
-
-def detach() -> None:
-    """Take them away."""
-    del bpy.types.Scene.seip
+PROPERTIES = ((bpy.types.Scene, "seip", PointerProperty(type=SEIP_PG_scene)),)

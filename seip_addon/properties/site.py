@@ -171,32 +171,35 @@ def _set_pole_rule(obj: bpy.types.Object, value: int) -> None:
             del obj[mark]
 
 
-def attach() -> None:
-    """Add the properties that edit custom properties of the contract to objects."""
-    bpy.types.Object.seip_region_weight = FloatProperty(
-        name="Weight",
-        description=f"Weight of each target in this region; other targets have 1 ({contract.WEIGHT})",
-        get=_region_weight,
-        set=_set_region_weight,
-        min=0.001,
-        soft_max=10.0,
-        options=set(),
-    )
-    bpy.types.Object.seip_pole_rule = EnumProperty(
-        name="Rule",
-        description=f"Rule for a sensor on this pole ({contract.FORBIDDEN}, {contract.MANDATORY})",
-        items=(
-            ("FREE", "Free", "A sensor is allowed"),
-            ("MANDATORY", "Sensor", "A sensor is required"),
-            ("FORBIDDEN", "No Sensor", "No sensor is allowed"),
+PROPERTIES = (
+    (
+        bpy.types.Object,
+        "seip_region_weight",
+        FloatProperty(
+            name="Weight",
+            description=f"Weight of each target in this region; other targets have 1 ({contract.WEIGHT})",
+            get=_region_weight,
+            set=_set_region_weight,
+            min=0.001,
+            soft_max=10.0,
+            options=set(),
         ),
-        get=_pole_rule,
-        set=_set_pole_rule,
-        options=set(),
-    )
-
-
-def detach() -> None:
-    """Take them away."""
-    del bpy.types.Object.seip_pole_rule
-    del bpy.types.Object.seip_region_weight
+    ),
+    (
+        bpy.types.Object,
+        "seip_pole_rule",
+        EnumProperty(
+            name="Rule",
+            description=f"Rule for a sensor on this pole ({contract.FORBIDDEN}, {contract.MANDATORY})",
+            items=(
+                ("FREE", "Free", "A sensor is allowed"),
+                ("MANDATORY", "Sensor", "A sensor is required"),
+                ("FORBIDDEN", "No Sensor", "No sensor is allowed"),
+            ),
+            get=_pole_rule,
+            set=_set_pole_rule,
+            options=set(),
+        ),
+    ),
+)
+"""Properties of objects that edit custom properties of the contract."""
