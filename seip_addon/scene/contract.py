@@ -1,4 +1,4 @@
-"""Names of collections and custom properties in the scene contract, which docs/architecture.md describes.
+"""Names of collections and custom properties in the scene contract, which docs/scene-contract.md describes.
 
 `tests/scene/test_read.py` shows its use.
 """

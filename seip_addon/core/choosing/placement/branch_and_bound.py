@@ -301,7 +301,7 @@ class BranchAndBound:
         """Return the problem of a node, and its targets."""
         whole = self._block.together(node.chosen)
         targets = self._block.open_targets(whole)
-        block, base = self._block.of(left, targets), whole[targets]
+        block, base = self._block.one_of_many(left, targets), whole[targets]
         raised = self._rounding + self._block.value_at(whole) - block.value_at(base)
         first = np.intersect1d(node.first, left)
         rest = rest_of(self.instance, node.chosen, left, node.composition)

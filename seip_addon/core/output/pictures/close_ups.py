@@ -80,7 +80,7 @@ def save_close_ups(  # what both kinds of pictures show
             row.append(_labelled(views[number], sensor, places[sensor.label], site.attribution))
         rows.append(row)
     with whole_file(path) as temporary:
-        close_up_sheet(rows).save(temporary, format="PNG", optimize=True)
+        close_up_sheet(rows).save(temporary, format="PNG")
 
 
 def _plan(content: MapContent, sensor: Sensor) -> Image.Image:

@@ -79,7 +79,7 @@ def as_png(figure: Figure) -> bytes:
     # Octrees keep rare colours, which here carry meaning; the median cut would mix them with frequent ones.
     picture = pixels.quantize(256, Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE)
     content = io.BytesIO()
-    picture.save(content, format="PNG", optimize=True, dpi=(figure.dpi, figure.dpi))
+    picture.save(content, format="PNG", dpi=(figure.dpi, figure.dpi))
     return content.getvalue()
 
 

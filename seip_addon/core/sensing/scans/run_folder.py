@@ -70,7 +70,7 @@ class Run:
         return digest(
             SCHEMA,
             self.versions["seip"],
-            source_digest(__name__),
+            source_digest(),
             json.dumps(asdict(self.settings)),
             *(self.static.triangles, self.static.reflectivity, self.static.region.wkb, self.origin, self.times),
             *(users, *motion, *sensors, *models),
