@@ -18,6 +18,7 @@ from ..core.output.pictures.labelled_view import save_labelled_view
 from ..core.output.pictures.plan_view import save_plan_view
 from ..core.output.results.candidate_table import save_candidate_table
 from ..core.output.results.carla import save_carla_spawns
+from ..core.output.results.comparison import packed_counts
 from ..core.output.results.file_names import REPORT_FILES
 from ..core.output.results.geojson import save_geojson
 from ..core.output.results.kml import save_kml
@@ -26,8 +27,10 @@ from ..core.output.results.placement_file import save_placement
 from ..core.output.results.placement_record import PlacementRecord
 from ..core.output.results.site_file import save_site_file
 from ..core.progress import Progress
-from ..core.storage.files import unfinished_name
+from ..core.site.site import Site
+from ..core.storage.files import digest, unfinished_name
 from ..core.workflows.survey import Survey
+from . import contract
 from .blend_file import save_blend
 from .gltf import save_glb
 from .pieces import tidy_pieces
@@ -105,7 +108,7 @@ def write_result_folder(
     with result_files(folder) as part:
         tidy_pieces(scene)
         write_result(scene, site, deployment)
-        save_blend(part["placed.blend"])
+        _save_placed(part["placed.blend"], scene, site, deployment, record)
         with TemporaryDirectory(prefix="seip-") as raw:
             pictures = render_elsewhere(Path(raw), part["placed.blend"], scene.name, site, deployment)
             with closing(pictures):
@@ -115,6 +118,16 @@ def write_result_folder(
                 yield from write_tables(part, survey, solution, record)
                 rendered = (yield from pictures) if render else None
             write_pictures(part, survey, record, deployment, rendered, shown_legend(scene))
+
+
+def _save_placed(
+    path: Path, scene: bpy.types.Scene, site: Site, deployment: Deployment, record: PlacementRecord
+) -> None:
+    """Save the scene with its placement as a custom property: only the add-on has properties of its own."""
+    seen = packed_counts(deployment.seen_by)
+    scene[contract.PLACEMENT] = {"record": record.text(), "targets": digest(site.targets.xyz), "seen": seen}
+    save_blend(path)
+    del scene[contract.PLACEMENT]
 
 
 def write_tables(

@@ -175,7 +175,7 @@ class BranchAndBound:
                 self._push(found[0], -found[0].rank)
         self._spare = 0.0
         self._note(self.bound)
-        yield self.incumbent.progress("bounding")
+        yield self.incumbent.progress("computing an upper bound")
         return rank
 
     def _root(self, root: _Node, begin: Float) -> Generator[Progress, None, tuple[_Node, Float] | None]:
@@ -199,7 +199,7 @@ class BranchAndBound:
             before = bound.value
             if self.incumbent.work.left > self._spare:
                 bound = self._steps(problem, bound, ROUND)
-            yield self.incumbent.progress("bounding")
+            yield self.incumbent.progress("computing an upper bound")
             within = np.flatnonzero(bound.forced() >= self.incumbent.least_better)
             if not len(within):
                 return None
