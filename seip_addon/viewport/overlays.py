@@ -1,6 +1,6 @@
 """Overlays of each scene: shown, hidden and found by name, and drawn in the scene's viewports.
 
-Blender's draw handlers are registered only while there is an overlay.
+Blender's draw handlers are registered only while there is an overlay. `tests/addon/test_view.py` shows its use.
 """
 
 from collections.abc import Iterable, Sequence
