@@ -30,7 +30,8 @@ from .daylight import add_daylight
 from .interrupts import held_signals
 
 WIDTH, HEIGHT = 1440, 810  # pixels
-SAMPLES, DENOISED_SAMPLES = 12, 1  # without and with a denoiser, for as little noise or less
+SAMPLES, DENOISED_SAMPLES = 12, 1  # without and with a denoiser
+"""Against 150 samples, close-ups of the shipped junction differ by 3.8 and 4.4 of 255 (root mean square)."""
 AZIMUTHS, ELEVATION = np.radians(-115.0 + 45.0 * np.arange(8)), math.radians(60.0)
 """Directions of the camera, seen from the region."""
 MOST_POINTS = 400  # places on the road at which the view is checked for obstacles

@@ -126,8 +126,10 @@ def _save_placed(
     """Save the scene with its placement as a custom property: only the add-on has properties of its own."""
     seen = packed_counts(deployment.seen_by)
     scene[contract.PLACEMENT] = {"record": record.text(), "targets": digest(site.targets.xyz), "seen": seen}
-    save_blend(path)
-    del scene[contract.PLACEMENT]
+    try:
+        save_blend(path)
+    finally:
+        del scene[contract.PLACEMENT]
 
 
 def write_tables(

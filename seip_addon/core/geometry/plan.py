@@ -71,7 +71,7 @@ def opened(area: BaseGeometry, width: float) -> BaseGeometry:
 def _narrower(area: BaseGeometry, by: float, join: Literal["mitre", "round"]) -> BaseGeometry:
     """Return an area in plan without a strip of a width in metres along its outline."""
     narrower = area.buffer(-by, join_style=join)
-    # GEOS may lose all of an area where an edge is a few micrometres long: corners are then rounded before
+    # GEOS may return nothing where an edge is a few micrometres long; corners are rounded first in that case
     lost = narrower.area < area.area - 2 * by * area.length
     return shapely.set_precision(area, _OVERLAY_GRID).buffer(-by, join_style=join) if lost else narrower
 

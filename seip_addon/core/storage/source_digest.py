@@ -14,7 +14,12 @@ CORE = __package__.rpartition(".")[0]  # full name of the core, which differs be
 def source_digest(*packages: str) -> str:
     """Return a digest of all sources of the core, and of further packages.
 
-    Sources may be in an archive; none is executed. Any change of the program gives its results other keys.
+    Sources may be in an archive; none is executed. Any change in them gives results other keys.
+
+    Parameters
+    ----------
+    *packages : str
+        Full names of packages, such as ``headless.detection``.
 
     Examples
     --------

@@ -162,7 +162,7 @@ class ConcaveSum:
         return type(self)(self.amounts[keep].take(targets, axis=1), self.weight[targets], self.g)
 
     def one_of_many(self, keep: Integer, targets: Integer) -> Self:
-        """Return `of`, sooner where many are taken from the same sum."""
+        """Return the same as `of`; faster where it is called many times on one sum."""
         return self.of(keep, targets)
 
     def together(self, chosen: Integer) -> Float:
@@ -279,7 +279,7 @@ class StepSum(ConcaveSum):
         return self.amounts.astype(np.uint8)
 
     def one_of_many(self, keep: Integer, targets: Integer) -> Self:
-        """Return `of`; bytes are gathered in less than half the time of floats."""
+        """Return the same as `of`: gathering bytes takes less than half the time of gathering floats."""
         amounts = self._bytes[keep].take(targets, axis=1).astype(self.amounts.dtype)
         return type(self)(amounts, self.weight[targets], self.g)
 
