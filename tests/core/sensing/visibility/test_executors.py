@@ -33,7 +33,12 @@ def cluster() -> Iterator[object]:
     from distributed import LocalCluster  # noqa: PLC0415 - an extra that need not be installed
 
     with LocalCluster(
-        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None, host="127.0.0.1", silence_logs=50
+        n_workers=2,
+        threads_per_worker=1,
+        processes=True,
+        dashboard_address="127.0.0.1:0",
+        host="127.0.0.1",
+        silence_logs=50,
     ) as started:
         yield started
 
@@ -68,7 +73,12 @@ def test_an_encrypted_cluster_is_reached_with_the_certificates_of_dasks_settings
     with (
         dask.config.set({**settings, "distributed.comm.require-encryption": True}),
         LocalCluster(
-            n_workers=1, processes=False, dashboard_address=None, host="127.0.0.1", protocol="tls", security=Security()
+            n_workers=1,
+            processes=False,
+            dashboard_address="127.0.0.1:0",
+            host="127.0.0.1",
+            protocol="tls",
+            security=Security(),
         ) as started,
     ):
         assert started.scheduler_address.startswith("tls://")
