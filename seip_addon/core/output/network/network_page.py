@@ -14,9 +14,10 @@ from ..pictures.drawing import percent
 from ..pictures.palette import INK, PAPER, PAPER_STREETS, SHARE_COLOURS, SOFT_INK
 from ..report.html import page
 from ..report.wording import dollars
-from .network_record import NetworkRecord, NetworkSite
-from .network_view import BARE_RADIUS, NetworkView, Street, legend_money, network_view, radius_of
-from .ranked_sites import (
+from .network_map import BARE_RADIUS, NetworkView, Street, legend_money, network_view, radius_of
+from .network_record import (
+    NetworkRecord,
+    NetworkSite,
     RankedSite,
     colour_title,
     gain_text,

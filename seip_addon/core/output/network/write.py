@@ -16,13 +16,10 @@ from ..report.pdf import as_pdf
 from ..report.wording import date, dollars
 from ..results.answer import sentence
 from ..results.file_names import REPORT_FILES
-from ..results.geojson import Feature, feature, save_features
-from ..results.located import DECIMALS
+from ..results.geographic_files import DECIMALS, Feature, feature, save_features
+from .network_map import MAP_SHAPE, Street, caption, draw_curve, draw_map, network_view
 from .network_page import network_page
-from .network_pictures import MAP_SHAPE, caption, draw_curve, draw_map
-from .network_record import NetworkRecord, network_json
-from .network_view import Street, network_view
-from .ranked_sites import RankedSite, gain_text, outcome, ranked_sites, sensors_text
+from .network_record import NetworkRecord, RankedSite, gain_text, network_json, outcome, ranked_sites, sensors_text
 
 COLUMNS = (
     *("rank", "name", "latitude_deg", "longitude_deg", "weight", "status", "sensors", "types", "price_usd", "value"),

@@ -1,8 +1,12 @@
 """Close-ups of each sensor on the plan and in the rendered view."""
 
+from __future__ import annotations
+
 import io
+import math
 import os
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import shapely
@@ -14,7 +18,6 @@ from ...choosing.placement.deployment import Deployment, Sensor
 from ...site.scene_geometry import SceneGeometry
 from ...site.site import Site
 from ...storage.files import whole_file
-from .close_up_sheet import MOST, TILE, close_up_sheet
 from .drawing import (
     MARK_RADIUS,
     SENSOR_MARK,
@@ -24,13 +27,13 @@ from .drawing import (
     credits_box,
     draw_attribution,
     draw_callouts,
+    draw_scale,
     markers_of,
     new_page,
+    scale_paper,
 )
 from .palette import INK, PAPER
 from .plan_map import SENSOR, MapContent, Window, draw_map, draw_street_names, map_content
-from .scale_bar import draw_scale, scale_paper
-from .viewpoint import Viewpoint, frame
 
 DPI = 160
 REACH = 20.0  # metres from the sensor to the left and right border of its plan
@@ -138,3 +141,100 @@ def _labelled(view: Image.Image, sensor: Sensor, place: tuple[float, float], att
     draw_attribution(axes, attribution)
     with Image.open(io.BytesIO(as_png(figure))) as drawn:
         return drawn.convert("RGB")
+
+
+TILE = (640, 480)
+"""Width and height of a close-up, pixels."""
+MOST = 60
+"""Largest number of sensors on a sheet: readers refuse larger pictures."""
+
+
+def close_up_sheet(rows: Sequence[Sequence[Image.Image]]) -> Image.Image:
+    """Return a sheet of close-ups, each of the size `TILE`, the same number in each row."""
+    sheet = Image.new("RGB", (len(rows[0]) * TILE[0], len(rows) * TILE[1]), PAPER)
+    for number, row in enumerate(rows):
+        for column, picture in enumerate(row):
+            sheet.paste(picture, (column * TILE[0], number * TILE[1]))
+    return sheet.quantize(256, Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE)
+
+
+def close_ups(sheet: bytes, count: int) -> list[tuple[bytes, ...]]:
+    """Return the pictures of each sensor on a sheet, as PNG: its plan, and its view if the sheet has views.
+
+    Raises
+    ------
+    ValueError
+        The sheet is not one of ``count`` sensors.
+    """
+    with Image.open(io.BytesIO(sheet), formats=("PNG",)) as picture:
+        across, rows = picture.width // TILE[0], min(count, MOST)
+        if picture.size != (across * TILE[0], rows * TILE[1]) or across not in {1, 2}:
+            raise ValueError(f"a sheet of {picture.width} by {picture.height} pixels, not of {count} sensors")
+        return [tuple(_tile(picture, column, row) for column in range(across)) for row in range(rows)]
+
+
+def _tile(sheet: Image.Image, column: int, row: int) -> bytes:
+    left, top = column * TILE[0], row * TILE[1]
+    content = io.BytesIO()
+    sheet.crop((left, top, left + TILE[0], top + TILE[1])).save(content, format="PNG")
+    return content.getvalue()
+
+
+@dataclass(frozen=True, eq=False)
+class Viewpoint:
+    """A perspective camera.
+
+    Parameters
+    ----------
+    place : (3,) float64, metres
+    axes : (3, 3) float64
+        Right, up and backwards as columns, orthonormal.
+    slopes : (2,) float64
+        Tangents of half the field of view, across and upwards.
+    """
+
+    place: Float
+    axes: Float
+    slopes: Float
+
+    def project(self, points: Float) -> Float:
+        """Return where points are on the picture, in shares of its width and height from the lower left.
+
+        Parameters
+        ----------
+        points : (n, 3) float64, metres
+            In front of the camera.
+
+        Returns
+        -------
+        (n, 2) float64
+        """
+        seen = (points - self.place) @ self.axes
+        return 0.5 + seen[:, :2] / (-2.0 * seen[:, 2:] * self.slopes)
+
+
+def frame(points: Float, azimuth: float, elevation: float, slopes: Float) -> Viewpoint:
+    r"""Return the nearest viewpoint in a direction that has all points in its picture.
+
+    With right, up and backwards coordinates :math:`r, u, b` of a point and :math:`c_r, c_u, c_b` of the camera, the
+    point is in the picture when :math:`|r - c_r| \le s_r (c_b - b)` and the same for :math:`u`. The largest :math:`r +
+    s_r b` and :math:`-r + s_r b` over all points therefore give :math:`c_r` and the least :math:`c_b` directly; the
+    larger of the two :math:`c_b` is taken.
+
+    Parameters
+    ----------
+    points : (n, 3) float64, metres
+    azimuth, elevation : float, radians
+        Direction from the points to the camera; azimuth counter-clockwise from +x.
+    slopes : (2,) float64
+        Tangents of half the field of view, across and upwards.
+    """
+    level, rise = math.cos(elevation), math.sin(elevation)
+    back = np.array((level * math.cos(azimuth), level * math.sin(azimuth), rise))
+    right = np.array((-math.sin(azimuth), math.cos(azimuth), 0.0))
+    axes = np.column_stack((right, np.cross(back, right), back))
+    seen = points @ axes
+    high = (seen[:, :2] + slopes * seen[:, 2:]).max(axis=0)
+    low = (-seen[:, :2] + slopes * seen[:, 2:]).max(axis=0)
+    place = axes @ np.append((high - low) / 2.0, ((high + low) / (2.0 * slopes)).max())
+    return Viewpoint(place, axes, slopes)

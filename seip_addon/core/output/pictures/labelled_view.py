@@ -9,11 +9,13 @@ from matplotlib.figure import Figure
 from matplotlib.image import imread
 from matplotlib.patches import Rectangle
 from matplotlib.text import Text
+from PIL import Image
 
 from ...arrays import Boolean, Float
 from ...choosing.placement.deployment import Deployment
 from ...site.site import Site
-from .coverage_colours import Legend
+from ...storage.files import whole_file
+from .colours import Legend
 from .drawing import (
     ATTRIBUTION_SIZE,
     Style,
@@ -140,3 +142,16 @@ def _draw_legend(figure: Figure, rows: list[list[tuple[str, str]]], credit: Sequ
 def _end(text: Text) -> float:
     """Return where a text ends, inches from the left of the picture."""
     return float(text.get_window_extent().x1) / DPI
+
+
+GAP = 24  # pixels between the two, and around them
+
+
+def save_sheet(path: str | os.PathLike[str], view: Image.Image, plan: Image.Image) -> None:
+    """Put a view to the left of a plan, scaled to the plan's width, as PNG."""
+    high = round(view.height * plan.width / view.width)
+    sheet = Image.new("RGB", (2 * plan.width + 3 * GAP, max(high, plan.height) + 2 * GAP), PAPER)
+    sheet.paste(view.convert("RGB").resize((plan.width, high), Image.Resampling.LANCZOS), (GAP, GAP))
+    sheet.paste(plan.convert("RGB"), (plan.width + 2 * GAP, GAP))
+    with whole_file(path) as temporary:
+        sheet.save(temporary, format="PNG")

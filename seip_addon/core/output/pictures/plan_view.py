@@ -17,7 +17,7 @@ from ...choosing.placement.deployment import Deployment, Sensor
 from ...counts import counted
 from ...site.scene_geometry import ASSUMED, FROM_MAP, OTHER_LEVELS, NamedArea, SceneGeometry
 from ...site.site import Site
-from .coverage_colours import of_placement
+from .colours import of_placement
 from .drawing import (
     SENSOR_MARK,
     Style,
@@ -25,12 +25,16 @@ from .drawing import (
     credits_box,
     credits_of,
     draw_attribution,
+    draw_north,
+    draw_scale,
     draw_sensors,
     heading_of,
     markers_of,
     new_page,
+    north_paper,
     percent,
     save_png,
+    scale_paper,
     wrapped,
 )
 from .palette import FORBIDDEN, INK, MANDATORY, SOFT_INK, WEIGHTED
@@ -49,7 +53,6 @@ from .plan_map import (
     map_content,
     mark_boxes,
 )
-from .scale_bar import draw_north, draw_scale, north_paper, scale_paper
 
 DPI = 160
 MARGIN = 0.3  # inches

@@ -14,11 +14,20 @@ from shapely.geometry.base import BaseGeometry
 from ...counts import counted
 from ...sensing.scans.frame import Frame, Labels
 from ...sensing.scans.sensor import MountedSensor
-from .cloud_colours import By, cloud_colours, sensor_colour, strength_ramp
-from .drawing import LABEL_SIZE, SENSOR_MARK, Style, add_axes, box_corners, draw_attribution, draw_polygons, save_png
+from .colours import By, cloud_colours, sensor_colour, strength_ramp
+from .drawing import (
+    LABEL_SIZE,
+    SENSOR_MARK,
+    Style,
+    add_axes,
+    box_corners,
+    draw_attribution,
+    draw_polygons,
+    draw_scale,
+    save_png,
+)
 from .palette import INK, MAX_INTENSITY, PAPER, SEEN_COLOURS, SOFT_INK
 from .plan_map import draw_area
-from .scale_bar import draw_scale
 
 DPI = 160
 MAP_SIDE, MARGIN, HEAD, FOOT = 8.0, 0.3, 0.95, 0.55  # inches

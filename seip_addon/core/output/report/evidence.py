@@ -14,7 +14,7 @@ from PIL import Image
 from ...arrays import Boolean, Integer
 from ...errors import SeipError
 from ...geometry.geo_reference import GeoReference
-from ..pictures.close_up_sheet import close_ups
+from ..pictures.close_ups import close_ups
 from ..results.file_names import (
     POSE_ERROR_PICTURES,
     TRAFFIC_PICTURES,
@@ -22,8 +22,7 @@ from ..results.file_names import (
     VERIFICATION_FOLDER,
     VERIFICATION_PICTURES,
 )
-from ..results.placement_file import load_placement
-from ..results.placement_record import PlacementRecord, RecordedSensor
+from ..results.placement_record import PlacementRecord, RecordedSensor, load_placement
 from ..results.site_file import SiteFile, load_site_file
 from ..results.verification_record import VerificationRecord, load_verification
 

@@ -9,9 +9,18 @@ from matplotlib.colors import ListedColormap
 
 from ...arrays import Float
 from ..pictures.chart_style import new_figure, style_axes
-from ..pictures.drawing import Style, as_png, draw_attribution, draw_callouts, new_page
+from ..pictures.drawing import (
+    Style,
+    as_png,
+    draw_attribution,
+    draw_callouts,
+    draw_north,
+    draw_scale,
+    new_page,
+    north_paper,
+    scale_paper,
+)
 from ..pictures.palette import INK, PAPER, SEEN_COLOURS, SOFT_INK
-from ..pictures.scale_bar import draw_north, draw_scale, north_paper, scale_paper
 from .blind_spots import BlindSpot
 from .evidence import Evidence
 

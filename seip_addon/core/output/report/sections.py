@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
+from pathlib import Path
 
 import numpy as np
 
@@ -19,16 +20,17 @@ from ...choosing.placement.returns_summary import (
     returns_text,
 )
 from ...counts import counted
+from ...progress import Progress
 from ...site.candidates import PAPER_TYPES
+from ...storage.files import whole_file
 from ..pictures.drawing import percent
-from ..results.answer import sentence
-from ..results.costs import Costs, costs_of
-from ..results.file_names import POSE_ERROR_PICTURES, TRAFFIC_PICTURES
-from ..results.located import LOCATED_FILES
+from ..results.answer import Costs, costs_of, sentence
+from ..results.file_names import POSE_ERROR_PICTURES, REPORT_FILES, TRAFFIC_PICTURES
+from ..results.geographic_files import LOCATED_FILES
 from ..results.placement_record import RecordedSensor, relevant_warnings
-from ..results.verification_record import RecordedChange
-from ..results.verification_text import (
+from ..results.verification_record import (
     LEAST_COST,
+    RecordedChange,
     change_text,
     cost_text,
     coverage_rows,
@@ -42,8 +44,10 @@ from ..results.verification_text import (
 )
 from .blind_spots import BlindSpot, blind_spots, centres, seen_places, seen_streets
 from .blocks import Block, Bullets, Card, Code, Facts, Paragraph, Picture, Pictures, Report, Section, Table
-from .evidence import Evidence
+from .evidence import Evidence, load_evidence
 from .figures import blind_spot_map, front_chart
+from .html import as_html
+from .pdf import as_pdf
 from .repeat import repeating_command
 from .wording import (
     altitude_zero,
@@ -633,3 +637,26 @@ def _settings(evidence: Evidence) -> Iterator[tuple[str, str]]:
     yield "With", ", ".join(f"{name} {version}" for name, version in record.versions.items())
     for name, value in record.inputs.items():
         yield f"Checksum of {name}", value
+
+
+def write_report(folder: Path) -> Generator[Progress, None, tuple[Path, ...]]:
+    """Write ``report.html`` and ``report.pdf`` into the folder of a result; the same folder gives the same bytes.
+
+    Returns
+    -------
+    tuple of path
+
+    Raises
+    ------
+    SeipError
+        The folder holds no result, or a damaged one, or cannot be written.
+    """
+    yield Progress(0, 0, "reading the result")
+    evidence = load_evidence(folder)
+    yield Progress(0, 0, "setting the report")
+    report = make_report(evidence)
+    contents = (as_html(report).encode("utf-8"), as_pdf(report))
+    for name, content in zip(REPORT_FILES, contents, strict=True):
+        with whole_file(folder / name) as temporary:
+            temporary.write_bytes(content)
+    return tuple(folder / name for name in REPORT_FILES)

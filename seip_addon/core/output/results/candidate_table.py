@@ -7,10 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...choosing.placement.deployment import Deployment, Sensor, sensor_at, weighted_share
+from ...geometry.orientation import degrees, tilt_degrees
 from ...sensing.lidar.model import LidarModel
 from ...site.site import Site
 from ...storage.csv_table import save_csv
-from .headings import degrees, tilt_degrees
 
 COLUMNS = (
     "pose", "position", "on_pole", "pole_source", "sensor", "height_m", "x_m", "y_m", "z_m",

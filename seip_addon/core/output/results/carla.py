@@ -19,11 +19,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...choosing.placement.deployment import Deployment, Sensor
+from ...geometry.orientation import clockwise_degrees, tilt_degrees
 from ...sensing.lidar.carla_dropoff import CarlaDropoff
 from ...sensing.lidar.model import LidarModel
 from ...sensing.lidar.range_equation import DROPOFF_REFLECTIVITY
 from ...storage.files import save_json
-from .headings import clockwise_degrees, tilt_degrees
 
 BLUEPRINT = "sensor.lidar.ray_cast"
 EVEN_WITHIN = math.radians(0.02)  # a hundredth is what data sheets print

@@ -5,10 +5,12 @@
 
 import json
 import math
+import os
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, fields, is_dataclass, replace
 from datetime import datetime
-from functools import cached_property
+from functools import cached_property, lru_cache
+from pathlib import Path
 from typing import Any, Literal, TypeVar, cast
 
 import numpy as np
@@ -20,8 +22,9 @@ from ...choosing.placement.objective import FrontPoint, Objective, Solution
 from ...choosing.placement.problem import Placement
 from ...choosing.placement.returns_summary import CrossingReturns, ReturnsSummary, share_reached
 from ...choosing.placement.search_limits import DEFAULT_EFFORT
+from ...errors import SeipError
 from ...geometry.geo_reference import GeoReference
-from ...geometry.orientation import orientation
+from ...geometry.orientation import degrees, orientation, tilt_degrees
 from ...sensing.lidar.model import LidarModel
 from ...sensing.scans.sensor import MountedSensor
 from ...sensing.visibility.settings import Engine, VisibilitySettings
@@ -30,8 +33,8 @@ from ...site.candidates import CandidateSettings
 from ...site.installed_cost import InstalledCost
 from ...site.site import Site
 from ...site.sources import SourceCount
-from ...storage.json_dataclass import from_json
-from .headings import degrees, tilt_degrees
+from ...storage.files import save_json
+from ...storage.json_dataclass import from_json, read_record
 
 Point = tuple[float, float, float]
 
@@ -531,3 +534,44 @@ def _significant(value: float) -> float:
 def _found(value: float) -> float | None:
     """Return None for a bound, or a gap, that the solver has not found."""
     return _significant(value) if math.isfinite(value) else None
+
+
+def save_placement(path: str | os.PathLike[str], record: PlacementRecord) -> None:
+    """Write ``placement.json``."""
+    save_json(path, record.as_json())
+
+
+def load_placement(path: str | os.PathLike[str]) -> PlacementRecord:
+    """Read ``placement.json``.
+
+    Raises
+    ------
+    SeipError
+        There is no such file, or it is not a placement of a version that this program can read.
+    """
+    try:
+        content = Path(path).read_bytes()
+    except OSError as error:
+        raise SeipError(f"cannot read {path}: {error.strerror}; name the placement.json of a finished run") from error
+    return _read(content, str(path))
+
+
+@lru_cache(maxsize=8)
+def parsed_record(text: str) -> PlacementRecord:
+    """Read the record that a scene keeps as `PlacementRecord.text`; panels do so at every redraw.
+
+    Raises
+    ------
+    SeipError
+        It is not a placement of a version that this program can read.
+    """
+    return _read(text, "the placement that this scene keeps")
+
+
+def comparable(record: PlacementRecord) -> dict[str, Any]:
+    """Return the content of a file without times and versions, which differ between machines and runs."""
+    return {key: value for key, value in record.as_json().items() if key not in {"times", "versions"}}
+
+
+def _read(text: str | bytes, name: str) -> PlacementRecord:
+    return read_record(PlacementRecord, text, SCHEMA, name, "place the sensors again")

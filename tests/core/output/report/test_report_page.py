@@ -15,10 +15,9 @@ from seip_addon.core.errors import SeipError
 from seip_addon.core.output.report.blocks import Card, Facts, Paragraph, Picture, Table
 from seip_addon.core.output.report.evidence import load_evidence
 from seip_addon.core.output.report.html import as_html
-from seip_addon.core.output.report.sections import make_report
+from seip_addon.core.output.report.sections import make_report, write_report
 from seip_addon.core.output.report.wording import altitude_zero, proof, returns_within
-from seip_addon.core.output.report.write import write_report
-from seip_addon.core.output.results.costs import costs_of
+from seip_addon.core.output.results.answer import costs_of
 from seip_addon.core.output.results.file_names import REPORT_FILES
 from seip_addon.core.output.results.placement_record import RecordedGeoReference
 from seip_addon.core.progress import finish

@@ -12,8 +12,15 @@ from seip_addon.core.choosing.placement.problem import Placement
 from seip_addon.core.choosing.placement.returns_summary import CrossingReturns, ReturnsSummary
 from seip_addon.core.errors import SeipError
 from seip_addon.core.geometry.geo_reference import GeoReference
-from seip_addon.core.output.results.placement_file import comparable, load_placement, parsed_record, save_placement
-from seip_addon.core.output.results.placement_record import PlacementRecord, Provenance, placement_record
+from seip_addon.core.output.results.placement_record import (
+    PlacementRecord,
+    Provenance,
+    comparable,
+    load_placement,
+    parsed_record,
+    placement_record,
+    save_placement,
+)
 from seip_addon.core.output.results.versions import versions
 from tests.builders.small_junction import Example, make_example
 from tests.oracles.json_schema import violations

@@ -1,6 +1,10 @@
 """Colours of targets in pictures and in the viewport: returns, coverage, weight, comparison."""
 
+import base64
+import binascii
+import zlib
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import pairwise
 from typing import Any, Literal
 
@@ -11,7 +15,20 @@ from ...arrays import Float, Integer
 from ...choosing.placement.deployment import Deployment
 from ...choosing.placement.returns_summary import FEW_RETURNS
 from ...errors import SeipError
-from .palette import RETURNS_COLOURS, SEEN_COLOURS, SEEN_TWICE, SEEN_WORDS, WEIGHT_COLOURS
+from ...sensing.scans.frame import STATIC_INSTANCE, Frame
+from ..pictures.palette import COMPARED_COLOURS
+from .palette import (
+    INTENSITY_COLOURS,
+    MAX_INTENSITY,
+    RETURNS_COLOURS,
+    SEEN_COLOURS,
+    SEEN_TWICE,
+    SEEN_WORDS,
+    SENSOR_COLOURS,
+    STATIC_COLOUR,
+    WEIGHT_COLOURS,
+    rgb,
+)
 
 Numbers = NDArray[np.floating[Any]]
 Aspect = Literal["returns", "seen", "times", "weights"]
@@ -128,3 +145,102 @@ def _by_weight(weight: Float) -> Colouring:
     spread = np.linspace(0, len(WEIGHT_COLOURS) - 1, max(len(groups), 2)).round().astype(int)
     colours = tuple(WEIGHT_COLOURS[place] for place in spread[: len(groups)])
     return Colouring(words, colours, group_of[of.ravel()], "Weight")
+
+
+By = Literal["sensor", "intensity", "instance"]
+
+GOLDEN_RATIO = 0.618033988749895  # of the colour circle, from a road user to the next: neighbours differ most
+
+
+def cloud_colours(frame: Frame, by: By) -> NDArray[np.float32]:
+    """Return red, green, blue and opacity (n, 4) of each point, sRGB."""
+    colours = np.ones((len(frame), 4), dtype=np.float32)
+    if by == "sensor":
+        palette = np.array([rgb(colour) for colour in SENSOR_COLOURS])
+        colours[:, :3] = palette[frame.sensor % len(palette)]
+    elif by == "intensity":
+        colours[:, :3] = strength_ramp(np.sqrt(np.minimum(frame.intensity / MAX_INTENSITY, 1.0)))
+    else:
+        hue = (frame.instance * GOLDEN_RATIO) % 1.0
+        wheel = np.abs((hue[:, None] + np.array([0.0, 2.0, 1.0]) / 3.0) % 1.0 * 6.0 - 3.0) - 1.0  # of HSV, saturated
+        bright = 0.35 + 0.65 * np.clip(wheel, 0.0, 1.0)
+        colours[:, :3] = np.where((frame.instance == STATIC_INSTANCE)[:, None], np.array(rgb(STATIC_COLOUR)), bright)
+    return colours
+
+
+def strength_ramp(share: Float) -> Float:
+    """Return colours (…, 3) along the scale of intensities, from 0 to 1."""
+    stops = np.array([rgb(colour) for colour in INTENSITY_COLOURS])
+    places = np.linspace(0.0, 1.0, len(stops))
+    return np.stack([np.interp(share, places, channel) for channel in stops.T], axis=-1)
+
+
+def sensor_colour(number: int) -> str:
+    """Return the web colour of a sensor's points."""
+    return SENSOR_COLOURS[number % len(SENSOR_COLOURS)]
+
+
+NEITHER, BOTH, PRESENT_ONLY, KEPT_ONLY = range(4)
+"""Classes of targets by which of the two placements see them."""
+CLASS_WORDS = ("seen by neither", "seen by both", "seen only by the present", "seen only by the kept")
+
+
+def compare(kept: Integer, present: Integer) -> Colouring:
+    """Compare two placements target by target.
+
+    Parameters
+    ----------
+    kept, present : (t,) int64
+        How many sensors of each placement see each target.
+
+    Returns
+    -------
+    Colouring
+        The class of each target: `NEITHER`, `BOTH`, `PRESENT_ONLY` or `KEPT_ONLY`.
+
+    Raises
+    ------
+    SeipError
+        They are of different targets.
+    """
+    if kept.shape != present.shape:
+        raise SeipError(
+            f"the placements were made on {len(kept):,} and on {len(present):,} targets: "
+            "place again with the same target grid to compare target by target"
+        )
+    before, after = kept > 0, present > 0
+    classes = np.select([before & after, after, before], [BOTH, PRESENT_ONLY, KEPT_ONLY], NEITHER).astype(np.int64)
+    return Colouring(CLASS_WORDS, COMPARED_COLOURS, classes, "Kept and present placement")
+
+
+@lru_cache(maxsize=8)  # a panel asks at every redraw
+def compared_shares(kept: str, present: str) -> tuple[float, ...]:
+    """Return the share of the targets in each class, 0 to 1, from two texts of `packed_counts`.
+
+    Raises
+    ------
+    SeipError
+        A text is damaged, or they are of different targets.
+    """
+    return tuple(compare(unpacked_counts(kept), unpacked_counts(present)).shares.tolist())
+
+
+def packed_counts(seen_by: Integer) -> str:
+    """Return counts as a text that a file can keep; 255 stands for more as well."""
+    counts = np.minimum(seen_by, 255).astype(np.uint8)
+    return base64.b64encode(zlib.compress(counts.tobytes(), 9)).decode("ascii")
+
+
+def unpacked_counts(text: str) -> Integer:
+    """Return the counts in a text of `packed_counts`.
+
+    Raises
+    ------
+    SeipError
+        It is damaged.
+    """
+    try:
+        raw = zlib.decompress(base64.b64decode(text, validate=True))
+    except (binascii.Error, zlib.error, ValueError) as error:
+        raise SeipError("the counts kept with the placement are damaged: place the sensors again") from error
+    return np.frombuffer(raw, dtype=np.uint8).astype(np.int64)

@@ -1,10 +1,13 @@
 """Placement of labels without overlaps."""
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
 from ...arrays import Boolean, Float
+from ...geometry.map_view import MapView
+from ...world.street_plan import NamePlaces
 
 Bounds = tuple[float, float, float, float]
 
@@ -122,3 +125,93 @@ def _hidden(low: Float, high: Float, subject: Float) -> Float:
     inside = np.all((subject > low[:, None]) & (subject < high[:, None]), axis=2).sum(axis=1)
     share: Float = inside / max(1, inside.max())
     return share
+
+
+MOST_LABELS = 60
+MOST_TRIED = 600
+ROOM = 1.1  # length of a street on the map, in lengths of its name, from which on it is named
+REPEATED = 350.0  # pixels between two labels of one street at least
+SPACE = 4.0  # pixels between labels
+
+
+@dataclass(frozen=True)
+class StreetLabel:
+    """A name on the map.
+
+    Parameters
+    ----------
+    name : str
+    middle : (x, y), pixels
+    angle : float, radians
+        Counter-clockwise from the horizontal, from -π/2 to π/2.
+    """
+
+    name: str
+    middle: tuple[float, float]
+    angle: float
+
+
+def street_labels(places: NamePlaces, widths: Float, height: float, view: MapView, dots: Float) -> list[StreetLabel]:
+    """Return labels that lie in the frame of a view without overlaps: main streets first, then by length.
+
+    Parameters
+    ----------
+    widths : (k,) float64, pixels
+        Width of each name.
+    height : float, pixels
+        Height of the letters.
+    dots : (m, 3) float64, pixels
+        x, y and radius of dots that no label may cover.
+    """
+    if not len(places.street):
+        return []
+    middles = view.to_pixels(places.positions)
+    wide = widths[places.street]
+    half = _half_sizes(wide, height, places.angles)
+    left, bottom, right, top = view.frame
+    inside = np.all((middles - half >= (left, bottom)) & (middles + half <= (right, top)), axis=1)
+    fits = inside & (places.lengths * view.scale >= ROOM * wide)
+    candidates = np.flatnonzero(fits)
+    from_middle = np.linalg.norm(middles[candidates] - ((left + right) / 2.0, (bottom + top) / 2.0), axis=1)
+    order = np.lexsort((from_middle, -places.lengths[candidates], -places.importance[candidates]))
+    chosen: list[int] = []
+    for one in candidates[order][:MOST_TRIED].tolist():
+        others = np.array(chosen, dtype=np.int64)
+        apart = np.abs(middles[others] - middles[one]) >= half[others] + half[one] + SPACE
+        same = places.street[others] == places.street[one]
+        near = np.linalg.norm(middles[others] - middles[one], axis=1) < REPEATED
+        covers = _covers(middles[one], (float(wide[one]), height), float(places.angles[one]), dots)
+        if apart.any(axis=1).all() and not (same & near).any() and not covers:
+            chosen.append(one)
+        if len(chosen) == MOST_LABELS:
+            break
+    return [
+        StreetLabel(
+            places.names[int(places.street[one])],
+            (float(middles[one, 0]), float(middles[one, 1])),
+            float(places.angles[one]),
+        )
+        for one in chosen
+    ]
+
+
+def _half_sizes(wide: Float, height: float, angles: Float) -> Float:
+    """Return half the width and height of the boxes around turned names, (n, 2)."""
+    cosine, sine = np.abs(np.cos(angles)), np.abs(np.sin(angles))
+    half: Float = np.stack((wide * cosine + height * sine, wide * sine + height * cosine), axis=1) / 2.0
+    return half
+
+
+def _covers(middle: Float, size: tuple[float, float], angle: float, dots: Float) -> bool:
+    """Return whether a turned box covers part of a dot."""
+    cosine, sine = math.cos(angle), math.sin(angle)
+    from_middle = (dots[:, :2] - middle) @ np.array(((cosine, -sine), (sine, cosine)))
+    beyond = np.maximum(np.abs(from_middle) - np.array(size) / 2.0, 0.0)
+    return bool((np.linalg.norm(beyond, axis=1) < dots[:, 2]).any())
+
+
+def start_of(label: StreetLabel, width: float, height: float) -> tuple[float, float]:
+    """Return the pixel at which a label's first letter starts on its base line."""
+    cosine, sine = math.cos(label.angle), math.sin(label.angle)
+    back, down = width / 2.0, height / 2.0
+    return label.middle[0] - back * cosine + down * sine, label.middle[1] - back * sine - down * cosine
