@@ -25,6 +25,7 @@ from .network_record import (
     level_words,
     outcome,
     ranked_sites,
+    result,
     sensors_text,
 )
 
@@ -177,8 +178,8 @@ def _table(record: NetworkRecord, ranked: tuple[RankedSite, ...]) -> str:
 def _row(record: NetworkRecord, one: RankedSite) -> str:
     site = one.site
     equipped = site.status == "equipped"
-    value = percent(site.coverage) if record.criterion == "road" else outcome(record, site.value)
-    figures = (value, gain_text(record, one.gain), dollars(site.price_usd)) if equipped else ("–", "–", "–")
+    known = (result(record, site), gain_text(record, one.gain), dollars(site.price_usd))
+    figures = known if equipped else ("–", "–", "–")
     cells = "".join(f'<td class="number">{words}</td>' for words in figures)
     sensors = sensors_text(site.sensors, record.sensor_names) if equipped else _described(record, site)
     place = "./" + quote(site.folder, safe="/")

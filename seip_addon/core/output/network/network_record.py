@@ -22,16 +22,7 @@ PROVEN = 1e-9
 
 @dataclass(frozen=True)
 class NetworkPoint:
-    """Value of the criterion for at most an amount of money, and the proven bound on it.
-
-    Parameters
-    ----------
-    price_usd : float, dollars
-    value : float
-        Best value found.
-    bound : float
-        No placement within that money has a larger value.
-    """
+    """Best value of the criterion found for at most an amount of money, and the proven bound on it."""
 
     price_usd: float
     value: float
@@ -51,7 +42,6 @@ class NetworkSensor:
         Height above the ground.
     position : str
         Name of the pole or the area that carries it.
-    price_usd : float, dollars
     """
 
     id: str
@@ -73,11 +63,8 @@ class NetworkSite:
         Name, and folder of its own files below that of the network.
     weight : float
         Importance of the site, as given.
-    status : {"equipped", "without sensor", "failed"}
     message : str
         Reason if the site failed, otherwise "".
-    price_usd : float, dollars
-        Money spent at the site.
     value, bound : float
         Value of the criterion at the site with its sensors, and a bound on it for that money.
     coverage : float, 0 to 1
@@ -116,14 +103,11 @@ class NetworkRecord:
     curve : tuple of NetworkPoint
         Value of the network for amounts of money; prices rise.
     sensor_types : tuple of str
-        Types to choose from, by their keys in the catalogue.
-    sensor_names : mapping of str to str
-        Name of the product for each key.
+        Types to choose from, by their keys in the catalogue; ``sensor_names`` has the products.
     created : str
         Time of the placement (ISO 8601), "" if it is not recorded.
     goal : float, optional
-        Share of the road that is seen at every site at the least price, where that was asked for; the budget is then
-        the price.
+        Share of the road to be seen at every site at the least price; the budget is then the price.
     least_usd : float, dollars
         Proven bound: nothing cheaper reaches the goal.
     """
@@ -193,15 +177,10 @@ _ORDER = ("equipped", "without sensor", "failed")
 
 @dataclass(frozen=True)
 class RankedSite:
-    """Site with its place in the order.
+    """Site with its number in the order, from 1, and its gain.
 
-    Parameters
-    ----------
-    number : int
-        From 1.
-    gain : float or None
-        Gain of the criterion for $1,000 spent at the site, times its weight over the mean weight; None if no money is
-        spent there.
+    ``gain`` is that of the criterion for $1,000 spent at the site, times its weight over the mean weight; None if no
+    money is spent there.
     """
 
     number: int
@@ -218,19 +197,13 @@ def ranked_sites(record: NetworkRecord) -> tuple[RankedSite, ...]:
     """Return the sites by falling gain per dollar; those without money, without sensor and failed ones follow."""
     weights = [site.weight for site in record.sites if site.status != "failed"]
     mean = math.fsum(weights) / len(weights) if weights else 0.0
-    gains = [_gain(site, site.weight / mean if mean > 0 else 1.0) for site in record.sites]
-    keys = [
-        (_ORDER.index(site.status), gain is None, -(gain or 0.0))
-        for site, gain in zip(record.sites, gains, strict=True)
-    ]
-    order = sorted(range(len(keys)), key=keys.__getitem__)
-    return tuple(RankedSite(number, record.sites[at], gains[at]) for number, at in enumerate(order, start=1))
-
-
-def _gain(site: NetworkSite, relative_weight: float) -> float | None:
-    if site.status != "equipped" or site.price_usd <= 0:
-        return None
-    return relative_weight * site.value / site.price_usd * 1000.0
+    rows: list[tuple[NetworkSite, float | None]] = []
+    for site in record.sites:
+        paid = site.status == "equipped" and site.price_usd > 0
+        relative = site.weight / mean if mean > 0 else 1.0
+        rows.append((site, relative * site.value / site.price_usd * 1000.0 if paid else None))
+    rows.sort(key=lambda row: (_ORDER.index(row[0].status), row[1] is None, -(row[1] or 0.0)))
+    return tuple(RankedSite(number, *row) for number, row in enumerate(rows, start=1))
 
 
 def sensors_text(sensors: Sequence[NetworkSensor], names: Mapping[str, str]) -> str:
@@ -242,6 +215,11 @@ def sensors_text(sensors: Sequence[NetworkSensor], names: Mapping[str, str]) -> 
 def outcome(record: NetworkRecord, value: float) -> str:
     """Return a value of the criterion as coverage in per cent, or as a typical number of returns."""
     return percent(value) if record.criterion == "road" else returns_text(math.expm1(value))
+
+
+def result(record: NetworkRecord, site: NetworkSite) -> str:
+    """Return the result of a site: the road seen, or the typical number of returns."""
+    return percent(site.coverage) if record.criterion == "road" else outcome(record, site.value)
 
 
 def gain_text(record: NetworkRecord, gain: float | None) -> str:

@@ -25,6 +25,7 @@ from ..results.file_names import (
 from ..results.placement_record import PlacementRecord, RecordedSensor, load_placement
 from ..results.site_file import SiteFile, load_site_file
 from ..results.verification_record import VerificationRecord, load_verification
+from .blind_spots import Centre, centres
 
 PICTURES = ("view.png", "plan.png")
 CLOSE_UPS = "sensors.png"
@@ -73,6 +74,11 @@ class Evidence:
     def area(self) -> float:
         """Square metres of road."""
         return len(self.site.targets) * self.site.targets.spacing**2
+
+    @property
+    def centres(self) -> list[Centre]:
+        """Points from which places on the road are counted; see `centres`."""
+        return centres(self.site.targets, self.site.areas)
 
     @property
     def geo_reference(self) -> GeoReference:

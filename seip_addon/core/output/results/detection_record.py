@@ -53,4 +53,4 @@ def parsed_detection(text: str) -> DetectionRecord:
     SeipError
         It is none, or one of another version.
     """
-    return read_record(DetectionRecord, text, SCHEMA, "the record of detection", "detect again")
+    return read_record(DetectionRecord, text, (SCHEMA,), "the record of detection", "detect again")

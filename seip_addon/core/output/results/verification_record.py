@@ -66,7 +66,7 @@ def load_verification(path: Path) -> VerificationRecord:
         It is damaged, or of a version that this program cannot read.
     """
     cure = "verify the installation again"
-    return read_record(VerificationRecord, read_small(path, _MOST_BYTES, cure), SCHEMA, str(path), cure)
+    return read_record(VerificationRecord, read_small(path, _MOST_BYTES, cure), (SCHEMA,), str(path), cure)
 
 
 LEAST_COST = 0.0005
