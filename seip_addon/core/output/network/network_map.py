@@ -20,14 +20,9 @@ from ..pictures.drawing import (
     Style,
     add_axes,
     as_png,
-    credits_box,
-    draw_attribution,
     draw_callouts,
-    draw_north,
-    draw_scale,
+    draw_corners,
     new_page,
-    north_paper,
-    scale_paper,
 )
 from ..pictures.palette import INK, PAPER, PAPER_STREETS, SHARE_COLOURS, SOFT_INK
 from ..report.wording import dollars
@@ -147,25 +142,16 @@ def draw_map(record: NetworkRecord, view: NetworkView) -> bytes:
     """Return the sites on the streets as PNG, the first of them with their ranks; the view has the shape of the map."""
     width, height = MAP_SIZE
     figure = new_page(MAP_SIZE, DPI)
-    axes = add_axes(figure, 0.0, LEGEND_HEIGHT, width, height - LEGEND_HEIGHT)
-    left, bottom, right, top = view.window
-    axes.set(xlim=(left, right), ylim=(bottom, top))
-    axes.spines[:].set(color=SOFT_INK, linewidth=0.6)
+    axes = add_axes(figure, 0.0, LEGEND_HEIGHT, width, height - LEGEND_HEIGHT, view.window)
     for rank, (colour, line) in enumerate(zip(PAPER_STREETS, STREET_WIDTHS, strict=True)):
         own = [street for street, importance in view.streets if importance == rank]
         axes.add_collection(LineCollection(own, colors=colour, linewidths=line, zorder=1.0), autolim=False)
     for at in np.argsort(-view.radii, kind="stable").tolist():
         axes.plot(*view.places[at], zorder=3.0, **_mark(record, view, at))
-    inch = view.width / width
-    draw_scale(axes, inch, 1.0)
-    draw_north(axes, inch)
-    draw_attribution(axes, record.attribution)
-    papers = (scale_paper(left, bottom, inch, 1.0), north_paper(right, top, inch))
-    taken = [(x, y, x + wide, y + high) for x, y, wide, high in papers]
-    taken += [credits_box(axes, record.attribution)] if record.attribution else []
+    taken = draw_corners(axes, record.attribution, longest=1.0)
     first = [one.site for one in ranked_sites(record)[:MOST_NUMBERED] if one.gain is not None]
     points = np.array([view.places[record.sites.index(site)] for site in first]).reshape(-1, 2)
-    draw_callouts(axes, points, [str(rank + 1) for rank in range(len(first))], view.places, 4.0, np.array(taken))
+    draw_callouts(axes, points, [str(rank + 1) for rank in range(len(first))], view.places, 4.0, taken)
     _draw_legend(figure, record, view)
     return as_png(figure)
 

@@ -22,18 +22,17 @@ from .drawing import (
     MARK_RADIUS,
     SENSOR_MARK,
     Style,
+    Window,
     add_axes,
     as_png,
-    credits_box,
     draw_attribution,
     draw_callouts,
-    draw_scale,
+    draw_corners,
     markers_of,
     new_page,
-    scale_paper,
 )
 from .palette import INK, PAPER
-from .plan_map import SENSOR, MapContent, Window, draw_map, draw_street_names, map_content
+from .plan_map import SENSOR, MapContent, draw_map, draw_street_names, map_content
 
 DPI = 160
 REACH = 20.0  # metres from the sensor to the left and right border of its plan
@@ -93,24 +92,18 @@ def _plan(content: MapContent, sensor: Sensor) -> Image.Image:
     up = REACH * height / width
     window = (x - REACH, y - up, x + REACH, y + up)
     figure = new_page((width, height), DPI)
-    axes = add_axes(figure, 0.0, 0.0, width, height)
+    axes = add_axes(figure, 0.0, 0.0, width, height, window)
     draw_map(axes, content, window, width)
-    inch = 2 * REACH / width
-    draw_scale(axes, inch, 1.0)
-    draw_attribution(axes, content.site.attribution)
-    left, bottom, across, high = scale_paper(window[0], window[1], inch, 1.0)
-    taken = [(left, bottom, left + across, bottom + high)]
-    if content.site.attribution:
-        taken.append(credits_box(axes, content.site.attribution))
+    taken = draw_corners(axes, content.site.attribution, longest=1.0, north=False)
     points = np.array([one.xyz[:2] for one in content.deployment.sensors])
     marks = [(*(point - 1.5), *(point + 1.5)) for point in points]
     names = draw_street_names(axes, content.geometry, window, width, [*taken, *marks])
-    _mark(axes, content, sensor, window, np.array([*taken, *names]))
+    _mark(axes, content, sensor, window, [*taken, *names])
     with Image.open(io.BytesIO(as_png(figure))) as drawn:
         return drawn.convert("RGB")
 
 
-def _mark(axes: Axes, content: MapContent, sensor: Sensor, window: Window, taken: Float) -> None:
+def _mark(axes: Axes, content: MapContent, sensor: Sensor, window: Window, taken: Sequence[Window]) -> None:
     """Mark and label the sensor of a close-up and its neighbours."""
     box = shapely.box(*window)
     shown = [one for one in content.deployment.sensors if box.contains(shapely.Point(one.xyz[:2]))]
@@ -182,15 +175,10 @@ def _tile(sheet: Image.Image, column: int, row: int) -> bytes:
 
 @dataclass(frozen=True, eq=False)
 class Viewpoint:
-    """A perspective camera.
+    """A perspective camera at a place (3,), metres.
 
-    Parameters
-    ----------
-    place : (3,) float64, metres
-    axes : (3, 3) float64
-        Right, up and backwards as columns, orthonormal.
-    slopes : (2,) float64
-        Tangents of half the field of view, across and upwards.
+    The columns of ``axes`` (3, 3) are right, up and backwards, orthonormal; ``slopes`` (2,) are the tangents of half
+    the field of view, across and upwards.
     """
 
     place: Float
@@ -198,17 +186,7 @@ class Viewpoint:
     slopes: Float
 
     def project(self, points: Float) -> Float:
-        """Return where points are on the picture, in shares of its width and height from the lower left.
-
-        Parameters
-        ----------
-        points : (n, 3) float64, metres
-            In front of the camera.
-
-        Returns
-        -------
-        (n, 2) float64
-        """
+        """Return the positions of points (n, 3) on the picture, (n, 2) in shares of its size from the lower left."""
         seen = (points - self.place) @ self.axes
         return 0.5 + seen[:, :2] / (-2.0 * seen[:, 2:] * self.slopes)
 
@@ -226,8 +204,6 @@ def frame(points: Float, azimuth: float, elevation: float, slopes: Float) -> Vie
     points : (n, 3) float64, metres
     azimuth, elevation : float, radians
         Direction from the points to the camera; azimuth counter-clockwise from +x.
-    slopes : (2,) float64
-        Tangents of half the field of view, across and upwards.
     """
     level, rise = math.cos(elevation), math.sin(elevation)
     back = np.array((level * math.cos(azimuth), level * math.sin(azimuth), rise))

@@ -1,4 +1,4 @@
-"""Colours of targets in pictures and in the viewport: returns, coverage, weight, comparison."""
+"""Colours of targets and of point clouds: returns, coverage, weight, comparison of two placements."""
 
 import base64
 import binascii
@@ -36,18 +36,7 @@ Aspect = Literal["returns", "seen", "times", "weights"]
 
 @dataclass(frozen=True, eq=False)
 class Legend:
-    """Legend of the colours of targets.
-
-    Parameters
-    ----------
-    title : str
-    words : tuple of str
-        Label of each class.
-    colours : tuple of str
-        Web colour of each class.
-    shares : (k,) float64
-        Share of the targets in each class, 0 to 1.
-    """
+    """Legend of the colours of targets: label, web colour and share of the targets (0 to 1) of each class."""
 
     title: str
     words: tuple[str, ...]
@@ -57,19 +46,7 @@ class Legend:
 
 @dataclass(frozen=True, eq=False)
 class Colouring:
-    """Classes of targets, each with its label and colour.
-
-    Parameters
-    ----------
-    words : tuple of str
-        Name of each class in a legend.
-    colours : tuple of str
-        Web colour of each class.
-    of : (t,) int64
-        The class of each target.
-    title : str
-        Title of the legend.
-    """
+    """Classes of targets, each with its label and web colour; ``of`` (t,) is the class of each target."""
 
     words: tuple[str, ...]
     colours: tuple[str, ...]
@@ -112,12 +89,10 @@ def colouring(aspect: Aspect, seen_by: Integer, weight: Float, returns: Numbers 
     Parameters
     ----------
     aspect : {"returns", "seen", "times", "weights"}
-        The returns from a pedestrian there, whether some sensor sees them, how many do, or how much they count.
+        Returns from a pedestrian, whether some sensor sees a target, how many do, or its weight.
     seen_by : (t,) int64
-        How many sensors see each target.
-    weight : (t,) float64
-    returns : (t,) float64, optional
-        Expected returns from a pedestrian near each target.
+        Number of sensors that see each target.
+    weight, returns : (t,) float64
 
     Raises
     ------
@@ -186,17 +161,7 @@ CLASS_WORDS = ("seen by neither", "seen by both", "seen only by the present", "s
 
 
 def compare(kept: Integer, present: Integer) -> Colouring:
-    """Compare two placements target by target.
-
-    Parameters
-    ----------
-    kept, present : (t,) int64
-        How many sensors of each placement see each target.
-
-    Returns
-    -------
-    Colouring
-        The class of each target: `NEITHER`, `BOTH`, `PRESENT_ONLY` or `KEPT_ONLY`.
+    """Colour targets by which of two placements see them, from the numbers of sensors of each that do, (t,) int64.
 
     Raises
     ------
@@ -215,13 +180,7 @@ def compare(kept: Integer, present: Integer) -> Colouring:
 
 @lru_cache(maxsize=8)  # a panel asks at every redraw
 def compared_shares(kept: str, present: str) -> tuple[float, ...]:
-    """Return the share of the targets in each class, 0 to 1, from two texts of `packed_counts`.
-
-    Raises
-    ------
-    SeipError
-        A text is damaged, or they are of different targets.
-    """
+    """Return the share of the targets in each class of `compare`, from two texts of `packed_counts`."""
     return tuple(compare(unpacked_counts(kept), unpacked_counts(present)).shares.tolist())
 
 

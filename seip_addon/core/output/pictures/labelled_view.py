@@ -18,6 +18,7 @@ from ...storage.files import whole_file
 from .colours import Legend
 from .drawing import (
     ATTRIBUTION_SIZE,
+    NOTE_PAPER,
     Style,
     credits_of,
     draw_sensors,
@@ -91,12 +92,12 @@ def save_labelled_view(  # noqa: PLR0913  # what is written on the picture
     size = np.array((width, height))
     taken = []
     if sight.hidden.any():
-        paper = {"boxstyle": "square,pad=0.25", "facecolor": PAPER, "alpha": 0.85, "edgecolor": "none"}
-        note = view.text(MARGIN, 0.08, HIDDEN_NOTE, va="bottom", size=ATTRIBUTION_SIZE, color=INK, bbox=paper, zorder=3)
+        style: Style = {"va": "bottom", "size": ATTRIBUTION_SIZE, "color": INK, "bbox": NOTE_PAPER, "zorder": 3}
+        note = view.text(MARGIN, 0.08, HIDDEN_NOTE, **style)
         extent = note.get_window_extent().padded(ATTRIBUTION_SIZE)
         taken.append(tuple((extent.get_points() / DPI - (0.0, foot)).ravel()))
     points, road = sight.sensors * size, sight.targets * size
-    draw_sensors(view, deployment, points, road, zorder=2, hidden=sight.hidden, taken=np.array(taken).reshape(-1, 4))
+    draw_sensors(view, deployment, points, road, zorder=2, hidden=sight.hidden, taken=taken)
     heading.draw(figure, MARGIN)
     _draw_legend(figure, rows, credit, foot)
     save_png(path, figure)

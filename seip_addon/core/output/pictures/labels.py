@@ -23,23 +23,21 @@ def place_callouts(  # what a label must keep off is of several kinds
     """Return the centre of each label's box, (k, 2) float64.
 
     Labels are set one after the other without leaving the picture or touching an anchor or an earlier label: near their
-    anchors, off the subject of the picture, and outwards from the middle of all anchors. Where there is no room near an
-    anchor, its label goes to the nearest free place of the picture, and where none is free, as near as it can.
+    anchors, off the subject of the picture, and outwards from the middle of all anchors. Without room near its anchor a
+    label goes to the nearest free place of the picture, and if none is free, as near as it can.
 
     Parameters
     ----------
-    anchors : (k, 2) float64
-        The points that the labels belong to.
-    sizes : (k, 2) float64
-        Widths and heights of the labels.
+    anchors, sizes : (k, 2) float64
+        Points that the labels belong to, and widths and heights of the labels.
     bounds : (left, bottom, right, top)
         Bounds of the picture, in the unit of the anchors.
     clearance : float
-        To keep between a label and everything else.
+        Distance between a label and everything else.
     subject : (m, 2) float64
-        Evenly spread points of what labels had better not hide.
+        Evenly spread points that labels hide only if there is no other room.
     taken : (n, 4) float64, optional
-        Left, bottom, right and top of boxes in which no label may be.
+        Left, bottom, right and top of boxes without labels.
     """
     low, high = np.array(bounds[:2]), np.array(bounds[2:])
     others = np.empty((0, 4)) if taken is None else taken.reshape(-1, 4)
@@ -72,14 +70,7 @@ def place_callouts(  # what a label must keep off is of several kinds
 def stack_upwards(boxes: Float, gap: float, taken: Float | None = None) -> Float:
     """Return how far up each box must move so that none overlaps another, (k,) float64; the lowest stay.
 
-    Parameters
-    ----------
-    boxes : (k, 4) float64
-        Left, bottom, width and height of each.
-    gap : float
-        Between two boxes, upwards.
-    taken : (n, 4) float64, optional
-        Left, bottom, width and height of boxes that stay, and that the others move above.
+    Boxes (k, 4) are left, bottom, width and height; between two there is a gap. Those in ``taken`` (n, 4) do not move.
     """
     fixed = np.empty((0, 4)) if taken is None else taken
     everything = np.concatenate((fixed, boxes))
@@ -136,15 +127,7 @@ SPACE = 4.0  # pixels between labels
 
 @dataclass(frozen=True)
 class StreetLabel:
-    """A name on the map.
-
-    Parameters
-    ----------
-    name : str
-    middle : (x, y), pixels
-    angle : float, radians
-        Counter-clockwise from the horizontal, from -π/2 to π/2.
-    """
+    """A name on the map, its middle in pixels, and its angle, radians counter-clockwise from -π/2 to π/2."""
 
     name: str
     middle: tuple[float, float]
@@ -154,20 +137,15 @@ class StreetLabel:
 def street_labels(places: NamePlaces, widths: Float, height: float, view: MapView, dots: Float) -> list[StreetLabel]:
     """Return labels that lie in the frame of a view without overlaps: main streets first, then by length.
 
-    Parameters
-    ----------
-    widths : (k,) float64, pixels
-        Width of each name.
-    height : float, pixels
-        Height of the letters.
-    dots : (m, 3) float64, pixels
-        x, y and radius of dots that no label may cover.
+    ``widths`` (k,) and ``height`` are those of the names, and ``dots`` (m, 3) have x, y and the radius of dots that no
+    label may cover; all in pixels.
     """
     if not len(places.street):
         return []
     middles = view.to_pixels(places.positions)
     wide = widths[places.street]
-    half = _half_sizes(wide, height, places.angles)
+    cosine, sine = np.abs(np.cos(places.angles)), np.abs(np.sin(places.angles))
+    half = np.stack((wide * cosine + height * sine, wide * sine + height * cosine), axis=1) / 2.0
     left, bottom, right, top = view.frame
     inside = np.all((middles - half >= (left, bottom)) & (middles + half <= (right, top)), axis=1)
     fits = inside & (places.lengths * view.scale >= ROOM * wide)
@@ -185,21 +163,9 @@ def street_labels(places: NamePlaces, widths: Float, height: float, view: MapVie
             chosen.append(one)
         if len(chosen) == MOST_LABELS:
             break
-    return [
-        StreetLabel(
-            places.names[int(places.street[one])],
-            (float(middles[one, 0]), float(middles[one, 1])),
-            float(places.angles[one]),
-        )
-        for one in chosen
-    ]
-
-
-def _half_sizes(wide: Float, height: float, angles: Float) -> Float:
-    """Return half the width and height of the boxes around turned names, (n, 2)."""
-    cosine, sine = np.abs(np.cos(angles)), np.abs(np.sin(angles))
-    half: Float = np.stack((wide * cosine + height * sine, wide * sine + height * cosine), axis=1) / 2.0
-    return half
+    names = [places.names[street] for street in places.street[chosen].tolist()] if chosen else []
+    rows = zip(names, middles[chosen].tolist(), places.angles[chosen].tolist(), strict=True)
+    return [StreetLabel(name, (x, y), angle) for name, (x, y), angle in rows]
 
 
 def _covers(middle: Float, size: tuple[float, float], angle: float, dots: Float) -> bool:

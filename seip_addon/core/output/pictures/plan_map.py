@@ -21,8 +21,8 @@ from ...site.scene_geometry import ASSUMED, OTHER_LEVELS, Mesh, SceneGeometry
 from ...site.site import Site
 from ...site.target_squares import target_squares
 from .colours import of_placement
-from .drawing import MARK_RADIUS, Style, draw_polygons, is_writable, text_width
-from .palette import ASSUMED_POLE_COLOUR, FORBIDDEN, INK, MANDATORY, PAPER, POLE_COLOUR, SOFT_INK, WEIGHTED
+from .drawing import MARK_RADIUS, Style, Window, draw_polygons, is_writable, text_width
+from .palette import ASSUMED_POLE_COLOUR, FORBIDDEN, INK, MANDATORY, PAPER, POLE_COLOUR, WEIGHTED
 
 ARROW_LENGTH, WEDGE_LENGTH = 0.34, 0.5  # inches
 LAND, PAVEMENT, ROAD, KERB = "#edefe9", "#e2dacb", "#dcdfe3", "#8f949a"
@@ -41,8 +41,6 @@ POLE_MARK: Style = {"linestyle": "none", "marker": "D", "markersize": 3.8, "mfc"
 ASSUMED_MARK: Style = POLE_MARK | {"mfc": PAPER, "mec": ASSUMED_POLE_COLOUR, "mew": 0.9}
 
 SURFACE, EDGE, TARGET, OBSTACLE, BORDER, CANDIDATE, TEXT, SENSOR = range(8)
-Window = tuple[float, float, float, float]
-"""Left, bottom, right and top of a part of the plane, metres."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,8 +69,7 @@ def map_content(geometry: SceneGeometry, site: Site, deployment: Deployment, win
 def draw_map(axes: Axes, content: MapContent, window: Window, width: float) -> None:
     """Draw the part of the plane in a window, without sensors; the axes are ``width`` inches wide."""
     geometry, site = content.geometry, content.site
-    axes.spines[:].set(color=SOFT_INK, linewidth=0.8)
-    axes.set(xlim=(window[0], window[2]), ylim=(window[1], window[3]), facecolor=LAND)
+    axes.set(facecolor=LAND)
     shown = shapely.box(*window)
     _draw_surfaces(axes, geometry, shown)
     _draw_targets(axes, site, content.deployment)

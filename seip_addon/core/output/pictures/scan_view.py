@@ -21,9 +21,8 @@ from .drawing import (
     Style,
     add_axes,
     box_corners,
-    draw_attribution,
+    draw_corners,
     draw_polygons,
-    draw_scale,
     save_png,
 )
 from .palette import INK, MAX_INTENSITY, PAPER, SEEN_COLOURS, SOFT_INK
@@ -61,15 +60,15 @@ def save_scan_view(
     figure = Figure((2 * MAP_SIDE + 3 * MARGIN, tall + HEAD + FOOT), dpi=DPI, facecolor=PAPER)
     by_kind: tuple[By, ...] = ("sensor", "intensity")
     for number, by in enumerate(by_kind):
-        axes = add_axes(figure, MARGIN + number * (MAP_SIDE + MARGIN), FOOT, MAP_SIDE, tall)
-        axes.set(xlim=(left, right), ylim=(bottom, top), facecolor=BACKGROUND_COLOUR)
+        window = (left, bottom, right, top)
+        axes = add_axes(figure, MARGIN + number * (MAP_SIDE + MARGIN), FOOT, MAP_SIDE, tall, window)
+        axes.set(facecolor=BACKGROUND_COLOUR)
         _draw_points(axes, frame.points, cloud_colours(frame, by)[:, :3])
         draw_area(axes, region, facecolor="none", edgecolor=SOFT_INK, linewidth=0.9)
         _draw_boxes(axes, frame.labels)
         colours = [sensor_colour(one) if by == "sensor" else PAPER for one in range(len(sensors))]
         _draw_sensors(axes, sensors, colours)
-        draw_scale(axes, (right - left) / MAP_SIDE)
-    draw_attribution(figure.axes[-1], attribution)
+        draw_corners(axes, attribution if number else (), north=False)
     _write_around(figure, frame, sensors)
     save_png(path, figure)
 

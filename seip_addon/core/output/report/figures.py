@@ -11,14 +11,11 @@ from ...arrays import Float
 from ..pictures.chart_style import new_figure, style_axes
 from ..pictures.drawing import (
     Style,
+    add_axes,
     as_png,
-    draw_attribution,
     draw_callouts,
-    draw_north,
-    draw_scale,
+    draw_corners,
     new_page,
-    north_paper,
-    scale_paper,
 )
 from ..pictures.palette import INK, PAPER, SEEN_COLOURS, SOFT_INK
 from .blind_spots import BlindSpot
@@ -40,9 +37,7 @@ def blind_spot_map(evidence: Evidence, spots: Sequence[BlindSpot]) -> bytes:
     window = _window(np.vstack((targets.xyz[:, :2], sensors)))
     page = (MAP_WIDTH, MAP_WIDTH * (window[3] - window[1]) / (window[2] - window[0]))
     figure = new_page(page, DPI)
-    axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
-    axes.set(xticks=(), yticks=())
-    axes.spines[:].set(color=SOFT_INK, linewidth=0.8)
+    axes = add_axes(figure, 0.0, 0.0, *page, window)
 
     column = np.round((x - x.min()) / targets.spacing).astype(np.int64)
     row = np.round((y - y.min()) / targets.spacing).astype(np.int64)
@@ -52,19 +47,13 @@ def blind_spot_map(evidence: Evidence, spots: Sequence[BlindSpot]) -> bytes:
     frame = (x.min() - half, x.max() + half, y.min() - half, y.max() + half)
     style: Style = {"cmap": ListedColormap(SEEN_COLOURS), "vmin": 0, "vmax": 2, "interpolation": "nearest"}
     axes.imshow(cells, origin="lower", extent=frame, aspect="auto", **style)
-    axes.set(xlim=(window[0], window[2]), ylim=(window[1], window[3]))
-    inch = (window[2] - window[0]) / MAP_WIDTH
-    draw_scale(axes, inch)
-    draw_north(axes, inch)
-    draw_attribution(axes, evidence.record.site.attribution)
-    papers = (scale_paper(window[0], window[1], inch), north_paper(window[2], window[3], inch))
-    taken = [(left, bottom, left + width, bottom + height) for left, bottom, width, height in papers]
-    middles = np.array([spot.middle[:2] for spot in spots])
-    room = 0.12 * inch
-    taken += [(*(middle - room), *(middle + room)) for middle in middles]
+    axes.set(xlim=(window[0], window[2]), ylim=(window[1], window[3]))  # which the image has changed
+    taken = draw_corners(axes, evidence.record.site.attribution)
+    middles, inch = np.array([spot.middle[:2] for spot in spots]), (window[2] - window[0]) / MAP_WIDTH
+    taken += [(*(middle - 0.12 * inch), *(middle + 0.12 * inch)) for middle in middles]
     axes.plot(*sensors.T, linestyle="none", marker="^", markersize=10, mfc=INK, mec=PAPER, mew=1.2, zorder=4.0)
     labels = [sensor.id for sensor in evidence.sensors]
-    draw_callouts(axes, sensors, labels, targets.xyz[:, :2], 3.0, np.array(taken))
+    draw_callouts(axes, sensors, labels, targets.xyz[:, :2], 3.0, taken)
     circle: Style = {"boxstyle": "circle,pad=0.22", "facecolor": PAPER, "edgecolor": INK, "linewidth": 1.2}
     style = {"ha": "center", "va": "center", "size": NUMBER_SIZE, "weight": "bold", "color": INK, "zorder": 5.0}
     for number, (right, up) in enumerate(_apart(middles, 0.24 * inch).tolist(), start=1):
@@ -109,15 +98,9 @@ def front_chart(
     ----------
     rows : sequence of (int, float, float)
         Number of sensors, value of the best placement found for it, and the largest amount by which the value of
-        another placement could be larger.
-    placed : (int, float)
-        Number of sensors and value of the placement itself.
-    label : str
-        Label of the axis.
-    text : callable
-        Function that returns a value as text.
-    high : float
-        Upper end of the axis.
+        another placement could be larger; ``placed`` has the first two of the placement itself.
+    label, text, high
+        Label of the axis of values, function that returns a value as text, and upper end of the axis.
     """
     counts, values, more = zip(*rows, strict=True)
     figure, (axes,) = new_figure(*CHART_SIZE, dpi=DPI)

@@ -110,8 +110,8 @@ def _block(block: Block) -> str:
         images = "".join(_image(png, block.about) for png in block.pngs)
         html = f'<figure><div class="pair">{images}</div></figure>'
     else:
-        head, *rows = (_row(block, row, tag) for tag, row in (("th", block.head), *(("td", row) for row in block.rows)))
-        inner = "\n".join(rows)
+        inner = "\n".join(_row(block, row, "td") for row in block.rows)
+        head = _row(block, block.head, "th")
         html = f"<table>\n<thead>\n{head}\n</thead>\n<tbody>\n{inner}\n</tbody>\n</table>"
     return html
 

@@ -383,13 +383,17 @@ def placement_record(
     known = site.geo_reference.in_hemisphere(site.origin)
     *offset, heading = known.header_offset
     reference = RecordedGeoReference(known.projection, _point(offset), tilt_degrees(heading))
-    greedy = solution.greedy and RecordedGreedy(
-        value=_significant(solution.greedy.objective),
-        # The better of the two bounds: once the optimum is proven, it no longer depends on a platform's rounding.
-        bound=_if_finite(min(solution.greedy.bound, placement.bound)),
-        gap_to_placement=1.0 - share_reached(solution.greedy.objective, placement.objective, of_returns=of_returns),
-        poses=tuple(solution.greedy.chosen.tolist()),
-        notes=solution.greedy.notes,
+    greedy = (
+        None
+        if solution.greedy is None
+        else RecordedGreedy(
+            value=_significant(solution.greedy.objective),
+            # The better of the two bounds: once the optimum is proven, it no longer depends on a platform's rounding.
+            bound=_if_finite(min(solution.greedy.bound, placement.bound)),
+            gap_to_placement=1.0 - share_reached(solution.greedy.objective, placement.objective, of_returns=of_returns),
+            poses=tuple(solution.greedy.chosen.tolist()),
+            notes=solution.greedy.notes,
+        )
     )
     record = PlacementRecord(
         site=RecordedSite(

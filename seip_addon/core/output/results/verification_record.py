@@ -27,10 +27,7 @@ Box = tuple[float, float, float, float, float, float, float]
 class RecordedChange:
     """An object that is new, gone, or a standing vehicle; see `Change`.
 
-    Parameters
-    ----------
-    coverage_cost : float or None
-        Share of the road that it costs, negative if it gains; None where it was not computed.
+    ``coverage_cost`` is the share of the road that it costs, negative if it gains; None if it was not computed.
     """
 
     kind: Literal["new", "gone", "vehicle"]
@@ -42,13 +39,7 @@ class RecordedChange:
 
 @dataclass(frozen=True)
 class VerificationRecord:
-    """Content of ``verification.json``.
-
-    Parameters
-    ----------
-    site, recording : str
-        Names of the scene and of the recording.
-    """
+    """Content of ``verification.json``, with the names of the scene and of the recording."""
 
     site: str
     recording: str
@@ -87,22 +78,16 @@ def pose_text(pose: InstalledSensor) -> str:
     at = f"{pose.id} is {math.hypot(*pose.shift_m):.2f} m from its planned position"
     where = f"{at}: {_listed(parts)}" if parts else at
     known = f"each within {_within(max(pose.shift_half_width_m), 1000, 'mm')} with 95% confidence"
-    return f"{where}, {known}. {_direction_text(pose)}"
-
-
-def _direction_text(pose: InstalledSensor) -> str:
     lean_x, lean_y, turn = pose.rotation_deg
-    lean = math.hypot(lean_x, lean_y)
-    parts = []
+    lean, parts = math.hypot(lean_x, lean_y), []
     if abs(turn) >= _LEAST_ANGLE:
         parts.append(f"turned {abs(turn):.1f}° {'counter-clockwise' if turn > 0 else 'clockwise'} as seen from above")
     if lean >= _LEAST_ANGLE:
         # A rotation vector (x, y) about horizontal axes moves the top of the sensor along (y, -x).
         parts.append(f"tilted {lean:.1f}° to the {direction((lean_y, -lean_x))}")
     within = _within(max(pose.rotation_half_width_deg), 100, "hundredths of a degree", "one hundredth of a degree")
-    if not parts:
-        return f"It points as planned, within {within}."
-    return f"It is {_listed(parts)}, within {within}."
+    points = f"It is {_listed(parts)}" if parts else "It points as planned"
+    return f"{where}, {known}. {points}, within {within}."
 
 
 def gain_text(pose: InstalledSensor) -> str:
@@ -181,21 +166,10 @@ def coverage_text(steps: CoverageSteps) -> str:
 
 def summary(record: VerificationRecord) -> tuple[str, ...]:
     """Return the sentences for a panel: how far each sensor is off, what has changed, and the coverage."""
-    return (_poses(record.sensors), _changes(record), coverage_text(record.coverage))
-
-
-def _poses(sensors: Sequence[InstalledSensor]) -> str:
-    parts = [
-        f"{one.id} by {math.hypot(*one.shift_m):.2f} m and {math.hypot(*one.rotation_deg):.1f}°" for one in sensors
-    ]
-    return f"Off the plan: {', '.join(parts)}."
-
-
-def _changes(record: VerificationRecord) -> str:
-    parts = list(_named(objects(record)))
-    if not parts:
-        return "Nothing has changed that the sensors see."
-    return f"{'; '.join(parts)}."
+    shifts = [(one.id, math.hypot(*one.shift_m), math.hypot(*one.rotation_deg)) for one in record.sensors]
+    off = ", ".join(f"{name} by {shift:.2f} m and {turn:.1f}°" for name, shift, turn in shifts)
+    changes = "; ".join(_named(objects(record))) or "Nothing has changed that the sensors see"
+    return f"Off the plan: {off}.", f"{changes}.", coverage_text(record.coverage)
 
 
 def _named(changes: Sequence[RecordedChange]) -> Iterator[str]:
