@@ -15,9 +15,10 @@ from matplotlib.lines import Line2D
 from ...arrays import Float
 from ...counts import round_number
 from ...geometry.tangent_plane import plan_metres
-from ..pictures.chart_style import add_legend, new_figure, set_title, style_axes
+from ..pictures.chart_style import add_legend, new_figure, plain_legend, set_title, style_axes
 from ..pictures.drawing import (
     Style,
+    Window,
     add_axes,
     as_png,
     draw_callouts,
@@ -41,20 +42,13 @@ LARGEST_RADIUS, SMALLEST_RADIUS, BARE_RADIUS = 18.0, 3.5, 4.5
 class NetworkView:
     """Sites of a network in a window, x east and y north in metres.
 
-    Parameters
-    ----------
-    places : (n, 2) float64
-        In the order of the record.
-    radii : (n,) float64, pixels
-        Areas of circles are proportional to the money spent.
-    window : (left, bottom, right, top)
-    streets : tuple of Street
-        Lines in metres, the least important first.
+    Sites have places (n, 2) in the order of the record, and radii (n,), pixels, of circles whose areas are proportional
+    to the money spent. Streets are lines in metres, the least important first.
     """
 
     places: Float
     radii: Float
-    window: tuple[float, float, float, float]
+    window: Window
     streets: tuple[Street, ...]
 
     @property
@@ -108,7 +102,7 @@ def _middle(degrees: Float) -> Float:
     return np.array(((degrees[:, 0].min() + degrees[:, 0].max()) / 2, west + arc / 2 if arc else east))
 
 
-def _drawn(streets: Sequence[Street], middle: Float, window: tuple[float, float, float, float]) -> Iterator[Street]:
+def _drawn(streets: Sequence[Street], middle: Float, window: Window) -> Iterator[Street]:
     """Yield the streets in a window, joined and simplified until they are few corners; the shortest are left out."""
     lines = []
     for rank in range(len(PAPER_STREETS)):
@@ -132,6 +126,10 @@ MAP_SHAPE = (MAP_SIZE[1] - LEGEND_HEIGHT) / MAP_SIZE[0]
 PIXEL = 0.45  # points for each pixel of `NetworkView.radii`
 STREET_WIDTHS = (0.4, 0.7, 1.2)  # points, by importance
 MOST_NUMBERED, MOST_MARKED = 12, 40  # sites with their rank on the map; points of a curve that are marked
+STATUS_MARKS: dict[str, Style] = {
+    "without sensor": {"marker": "o", "markersize": 2 * BARE_RADIUS * PIXEL, "mfc": PAPER, "mec": SOFT_INK, "mew": 1.0},
+    "failed": {"marker": "x", "markersize": 6.5, "mec": SOFT_INK, "mew": 1.4},
+}
 CRITERIA = {
     "road": "road seen, mean of the sites",
     "returns": "typical returns from a road user",
@@ -158,35 +156,28 @@ def draw_map(record: NetworkRecord, view: NetworkView) -> bytes:
 
 def _mark(record: NetworkRecord, view: NetworkView, at: int) -> Style:
     site = record.sites[at]
-    if site.status == "failed":
-        return {"marker": "x", "markersize": 6.5, "mec": SOFT_INK, "mew": 1.4}
-    if site.status == "without sensor":
-        return {"marker": "o", "markersize": 2 * BARE_RADIUS * PIXEL, "mfc": PAPER, "mec": SOFT_INK, "mew": 1.0}
+    if site.status != "equipped":
+        return STATUS_MARKS[site.status]
     size = 2 * PIXEL * float(view.radii[at])
     return {"marker": "o", "markersize": size, "mfc": SHARE_COLOURS[level(record, site)], "mec": INK, "mew": 0.8}
 
 
 def _draw_legend(figure: Figure, record: NetworkRecord, view: NetworkView) -> None:
-    circle: Style = {"linestyle": "none", "marker": "o", "mec": INK, "mew": 0.8}
-    entries = [
-        Line2D([], [], mfc=colour, markersize=7.0, label=words, **circle)
+    circle: Style = {"marker": "o", "mec": INK, "mew": 0.8}
+    marks = [
+        (words, circle | {"mfc": colour, "markersize": 7.0})
         for colour, words in zip(SHARE_COLOURS, level_words(record), strict=True)
     ]
     for money in legend_money(record):
         size = 2 * PIXEL * radius_of(record, view, money)
-        entries.append(Line2D([], [], mfc="none", markersize=size, label=dollars(money), **circle))
-    for status, mark in (
-        ("without sensor", circle | {"mfc": PAPER, "mec": SOFT_INK, "markersize": 2 * BARE_RADIUS * PIXEL}),
-        ("failed", {"linestyle": "none", "marker": "x", "mec": SOFT_INK, "mew": 1.4, "markersize": 6.5}),
-    ):
-        if any(site.status == status for site in record.sites):
-            entries.append(Line2D([], [], label=status, **mark))
-    style: Style = {"ncols": len(entries), "frameon": False, "fontsize": 8, "borderaxespad": 0.0}
+        marks.append((dollars(money), circle | {"mfc": "none", "markersize": size}))
+    there = {site.status for site in record.sites}
+    marks += [(status, mark) for status, mark in STATUS_MARKS.items() if status in there]
+    lines = [Line2D([], [], linestyle="none", **mark) for _, mark in marks]
+    style: Style = {"ncols": len(marks), "fontsize": 8, "borderaxespad": 0.0, "loc": "lower center"}
     spacing: Style = {"handletextpad": 0.1, "columnspacing": 0.9, "title_fontsize": 8, "bbox_to_anchor": (0.5, 0.005)}
     title = f"{colour_title(record)} (colour), money spent (area); numbers: ranks by gain per dollar"
-    legend = figure.legend(handles=entries, title=title, loc="lower center", **style, **spacing)
-    for text in legend.get_texts():
-        text.set_parse_math(False)
+    plain_legend(figure, lines, [words for words, _ in marks], title=title, **style, **spacing)
 
 
 def draw_curve(record: NetworkRecord) -> bytes:

@@ -5,6 +5,7 @@ import os
 from collections.abc import Iterable, Sequence
 from typing import Any, Literal
 
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
@@ -71,7 +72,12 @@ def add_legend(figure: Figure, panels: Sequence[Axes], columns: int | None = Non
     if columns is None:
         widths, room = [0.6 + 0.07 * len(label) for label in labels], figure.get_figwidth()  # inches, about
         columns = len(labels) if sum(widths) < room else max(1, int(room // max(widths)))
-    legend = figure.legend(handles, labels, frameon=False, fontsize=9, loc="outside lower center", ncols=columns)
+    plain_legend(figure, handles, labels, loc="outside lower center", ncols=columns)
+
+
+def plain_legend(figure: Figure, handles: Sequence[Artist], labels: Sequence[str], **style: Any) -> None:  # noqa: ANN401 -- as above
+    """Write a legend without a frame whose labels are never taken for formulas."""
+    legend = figure.legend(handles, labels, **{"frameon": False, "fontsize": 9} | style)
     for text in legend.get_texts():
         text.set_parse_math(False)
 

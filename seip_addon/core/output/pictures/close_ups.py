@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from PIL import Image
 
 from ...arrays import Float
@@ -34,7 +35,12 @@ from .drawing import (
 from .palette import INK, PAPER
 from .plan_map import SENSOR, MapContent, draw_map, draw_street_names, map_content
 
+TILE = (640, 480)
+"""Width and height of a close-up, pixels."""
+MOST = 60
+"""Largest number of sensors on a sheet: readers refuse larger pictures."""
 DPI = 160
+SIZE = (TILE[0] / DPI, TILE[1] / DPI)  # of a close-up, inches
 REACH = 20.0  # metres from the sensor to the left and right border of its plan
 VIEW_REACH = 9.0  # metres around the sensor that its view shows
 SLOPES = np.array((0.52, 0.39))  # tangents of half the field of view
@@ -64,34 +70,27 @@ def save_close_ups(  # what both kinds of pictures show
 ) -> None:
     """Write a sheet with the plan and the view of each sensor's surroundings, as PNG; without views only the plans.
 
-    Parameters
-    ----------
-    views : sequence of Image
-        Rendered close-ups in the order of the sensors, each of the size `TILE`; none at all without rendering.
-    places : mapping of str to (float, float)
-        Where each sensor with a view is on it, by its label, in shares of width and height from the lower left.
+    ``views`` are of the size `TILE`, in the order of the sensors; ``places`` has the position of each sensor on its
+    view, by its label, in shares of width and height from the lower left.
     """
     sensors = deployment.sensors[:MOST]
     if not sensors:
         return
     content = map_content(geometry, site, deployment, site.region.buffer(REACH).bounds)
-    rows = []
-    for number, sensor in enumerate(sensors):
-        row = [_plan(content, sensor)]
-        if views:
-            row.append(_labelled(views[number], sensor, places[sensor.label], site.attribution))
-        rows.append(row)
+    rows = [[_plan(content, sensor)] for sensor in sensors]
+    for row, view, sensor in zip(rows, views, sensors, strict=False):
+        row.append(_labelled(view, sensor, places[sensor.label], site.attribution))
     with whole_file(path) as temporary:
         close_up_sheet(rows).save(temporary, format="PNG", optimize=True)
 
 
 def _plan(content: MapContent, sensor: Sensor) -> Image.Image:
     """Return the plan of a sensor's surroundings."""
-    width, height = TILE[0] / DPI, TILE[1] / DPI
+    width, height = SIZE
     x, y = sensor.xyz[:2].tolist()
     up = REACH * height / width
     window = (x - REACH, y - up, x + REACH, y + up)
-    figure = new_page((width, height), DPI)
+    figure = new_page(SIZE, DPI)
     axes = add_axes(figure, 0.0, 0.0, width, height, window)
     draw_map(axes, content, window, width)
     taken = draw_corners(axes, content.site.attribution, longest=1.0, north=False)
@@ -99,8 +98,7 @@ def _plan(content: MapContent, sensor: Sensor) -> Image.Image:
     marks = [(*(point - 1.5), *(point + 1.5)) for point in points]
     names = draw_street_names(axes, content.geometry, window, width, [*taken, *marks])
     _mark(axes, content, sensor, window, [*taken, *names])
-    with Image.open(io.BytesIO(as_png(figure))) as drawn:
-        return drawn.convert("RGB")
+    return _drawn(figure)
 
 
 def _mark(axes: Axes, content: MapContent, sensor: Sensor, window: Window, taken: Sequence[Window]) -> None:
@@ -111,15 +109,14 @@ def _mark(axes: Axes, content: MapContent, sensor: Sensor, window: Window, taken
     draw_callouts(axes, points, [one.label for one in shown], points, SENSOR - 0.5, taken)
     markers = markers_of(content.deployment)
     for one in shown:
-        size = SENSOR_MARK["markersize"] * (1.25 if one is sensor else 0.8)
-        style = SENSOR_MARK | {"markersize": size}
+        style = SENSOR_MARK | {"markersize": SENSOR_MARK["markersize"] * (1.25 if one is sensor else 0.8)}
         axes.plot(*one.xyz[:2], marker=markers[one.model.key], zorder=SENSOR, **style)
 
 
 def _labelled(view: Image.Image, sensor: Sensor, place: tuple[float, float], attribution: Sequence[str]) -> Image.Image:
     """Return a rendered close-up with a ring round the sensor and its label."""
-    width, height = TILE[0] / DPI, TILE[1] / DPI
-    figure = new_page((width, height), DPI)
+    width, height = SIZE
+    figure = new_page(SIZE, DPI)
     axes = add_axes(figure, 0.0, 0.0, width, height)
     axes.axis("off")
     paper = Image.new("RGB", TILE, "#e9edf0")
@@ -132,14 +129,12 @@ def _labelled(view: Image.Image, sensor: Sensor, place: tuple[float, float], att
     axes.plot(*point, mec=PAPER, mew=4.0, zorder=3.0, **ring)
     axes.plot(*point, mec=INK, mew=2.0, zorder=3.1, **ring)
     draw_attribution(axes, attribution)
+    return _drawn(figure)
+
+
+def _drawn(figure: Figure) -> Image.Image:
     with Image.open(io.BytesIO(as_png(figure))) as drawn:
         return drawn.convert("RGB")
-
-
-TILE = (640, 480)
-"""Width and height of a close-up, pixels."""
-MOST = 60
-"""Largest number of sensors on a sheet: readers refuse larger pictures."""
 
 
 def close_up_sheet(rows: Sequence[Sequence[Image.Image]]) -> Image.Image:
