@@ -133,7 +133,11 @@ def _openpcdet_files(sample: Sample) -> Files:
 
 def _openpcdet_index(folder: Path, splits: Splits) -> dict[str, bytes]:
     """Return the splits, and a configuration whose range holds every box."""
-    return {**image_sets(splits), "custom_dataset.yaml": _configuration(_label_boxes(folder, splits)).encode()}
+    boxes = [np.empty((0, 7))]
+    for name in (name for names in splits.values() for name in names):
+        found, classes = read_labels(folder / f"labels/{name}.txt")
+        boxes.append(found[[kind != "DontCare" for kind in classes]])
+    return {**image_sets(splits), "custom_dataset.yaml": _configuration(np.concatenate(boxes)).encode()}
 
 
 def point_cloud_range(boxes: Float) -> Float:
@@ -151,14 +155,6 @@ def point_cloud_range(boxes: Float) -> Float:
     bottom = math.floor(low[2] * 10) / 10
     top = bottom + HEIGHT_STEP * math.ceil((high[2] - bottom) / HEIGHT_STEP)
     return np.round([*(centre - half), bottom, *(centre + half), top], 1)
-
-
-def _label_boxes(folder: Path, splits: Splits) -> Float:
-    boxes = [np.empty((0, 7))]
-    for name in (name for names in splits.values() for name in names):
-        found, classes = read_labels(folder / f"labels/{name}.txt")
-        boxes.append(found[[kind != "DontCare" for kind in classes]])
-    return np.concatenate(boxes)
 
 
 def _configuration(boxes: Float) -> str:
@@ -226,23 +222,19 @@ def _mmdetection3d_index(folder: Path, splits: Splits) -> dict[str, bytes]:
 
 
 def _information(folder: Path, names: Sequence[str]) -> bytes:
-    value = {
-        "metainfo": {"categories": LABELS, "dataset": "custom", "info_version": "1.1"},
-        "data_list": [
+    samples = []
+    for name in names:
+        boxes, classes = read_labels(folder / f"labels/{name}.txt")
+        rows = zip(boxes.tolist(), classes, strict=True)
+        samples.append(
             {
                 "sample_idx": int(name),
                 "lidar_points": {"num_pts_feats": 4, "lidar_path": f"{name}.bin"},
-                "instances": _instances(folder / f"labels/{name}.txt"),
+                "instances": [{"bbox_3d": box, "bbox_label_3d": LABELS[kind]} for box, kind in rows],
             }
-            for name in names
-        ],
-    }
-    return pickle.dumps(value, protocol=PICKLE_PROTOCOL)
-
-
-def _instances(path: Path) -> list[dict[str, Any]]:
-    boxes, classes = read_labels(path)
-    return [{"bbox_3d": box, "bbox_label_3d": LABELS[name]} for box, name in zip(boxes.tolist(), classes, strict=True)]
+        )
+    about = {"categories": LABELS, "dataset": "custom", "info_version": "1.1"}
+    return pickle.dumps({"metainfo": about, "data_list": samples}, protocol=PICKLE_PROTOCOL)
 
 
 KITTI_CLASSES = {category: KITTI_CLASS[name] for category, name in CLASSES.items()}

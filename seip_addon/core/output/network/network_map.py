@@ -24,6 +24,7 @@ from ..pictures.drawing import (
     draw_callouts,
     draw_corners,
     new_page,
+    window_around,
 )
 from ..pictures.palette import INK, PAPER, PAPER_STREETS, SHARE_COLOURS, SOFT_INK
 from ..report.wording import dollars
@@ -68,10 +69,8 @@ def network_view(record: NetworkRecord, streets: Sequence[Street] | None, shapes
     middle = _middle(degrees)
     places = plan_metres(degrees, middle)
     low, high = (places.min(axis=0), places.max(axis=0)) if len(places) else (np.zeros(2), np.zeros(2))
-    width, height = np.maximum((1 + 2 * MARGIN) * (high - low), LEAST_EXTENT).tolist()
-    width, height = max(width, height / shapes[1]), max(height, width * shapes[0])
-    x, y = ((low + high) / 2).tolist()
-    window = (x - width / 2, y - height / 2, x + width / 2, y + height / 2)
+    around = np.maximum(MARGIN * (high - low), (LEAST_EXTENT - (high - low)) / 2)
+    window = window_around((*(low - around).tolist(), *(high + around).tolist()), 0.0, shapes)
     money = np.array([site.price_usd for site in record.sites])
     largest = min(LARGEST_RADIUS, max(9.0, 110.0 / math.sqrt(max(1, len(money)))))
     radii = np.maximum(SMALLEST_RADIUS, largest * np.sqrt(money / max(1.0, money.max(initial=0.0))))

@@ -74,6 +74,9 @@ def network_page(record: NetworkRecord, streets: Sequence[Street] | None = None)
         if equipped
         else "No site has sensors."
     )
+    length = round_number(view.width / 6)
+    words = f"{length:g} m" if length < 1000 else f"{length / 1000:g} km"
+    bar = f'<div class="scale" style="width: {100 * length / view.width:.3f}%"></div><span>{words}</span>'
     credits_ = "".join(f"<div>{escape(line)}</div>" for line in record.attribution)
     body = f"""<header>
 <h1><bdi>{escape(record.name)}</bdi></h1>
@@ -82,7 +85,7 @@ def network_page(record: NetworkRecord, streets: Sequence[Street] | None = None)
 <main>
 <a class="skip" href="#sites">Skip the map</a>
 {_map(record, view, ranked)}
-<div class="under">{_scale(view)}<div>{credits_}</div></div>
+<div class="under"><div style="flex: 1 0 100%">{bar}</div><div>{credits_}</div></div>
 {_legend(record, view)}
 <h2 id="sites">Sites</h2>
 <div class="wide">
@@ -136,13 +139,6 @@ def _described(record: NetworkRecord, site: NetworkSite) -> str:
     seen = f"{percent(site.coverage)} of the road seen"
     typical = "" if record.criterion == "road" else f"{outcome(record, site.value)} typical returns, "
     return f"{sensors_text(site.sensors, record.sensor_names)}, {dollars(site.price_usd)}, {typical}{seen}"
-
-
-def _scale(view: NetworkView) -> str:
-    length = round_number(view.width / 6)
-    words = f"{length:g} m" if length < 1000 else f"{length / 1000:g} km"
-    width = f"{100 * length / view.width:.3f}%"
-    return f'<div style="flex: 1 0 100%"><div class="scale" style="width: {width}"></div><span>{words}</span></div>'
 
 
 def _legend(record: NetworkRecord, view: NetworkView) -> str:

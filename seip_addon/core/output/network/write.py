@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
 from ...counts import counted
 from ...storage.csv_table import save_csv
 from ...storage.files import save_json, whole_file
 from ..pictures.drawing import percent
-from ..report.blocks import Block, Bullets, Facts, Paragraph, Picture, Report, Section, Table
+from ..report.blocks import Block, Bullets, Facts, Paragraph, Picture, Report, Table, make_sections
 from ..report.pdf import save_report
 from ..report.wording import date, dollars
 from ..results.answer import sentence
@@ -112,19 +112,21 @@ def _within_a_turn(longitude: float) -> float:
 def make_network_report(record: NetworkRecord, drawn_map: bytes, drawn_curve: bytes) -> Report:
     """Return the report with the map and the curve, PNG, on its first page."""
     ranked = ranked_sites(record)
-    sections = (
-        Section("Sites with sensors", tuple(_equipped(record, ranked))),
-        Section("Sites that failed", tuple(_failed(ranked))),
-        Section("Notes", (Bullets(tuple(map(sentence, record.notes))),) if record.notes else ()),
-        Section("Sources", (Bullets(record.attribution),) if record.attribution else ()),
-    )
+    failed = tuple((one.site.name, one.site.message) for one in ranked if one.site.status == "failed")
+    left_out = (Paragraph("The figures of the network leave these sites out."), Table(("Site", "Reason"), failed))
+    contents: dict[str, Iterable[Block]] = {
+        "Sites with sensors": _equipped(record, ranked),
+        "Sites that failed": left_out if failed else (),
+        "Notes": [Bullets(tuple(map(sentence, record.notes)))] if record.notes else [],
+        "Sources": [Bullets(record.attribution)] if record.attribution else [],
+    }
     first = (
         Facts(tuple(_key_figures(record)), large=True),
         Picture(drawn_map, "Sites, north is up. Colour shows the result, area the money; hollow: without sensor."),
         Picture(drawn_curve, caption(record)),
     )
     title = f"Roadside LiDAR sensors at the sites of a network{f', {date(record.created)}' if record.created else ''}"
-    return Report(record.name, title, record.created, first, sections)
+    return Report(record.name, title, record.created, first, make_sections(contents))
 
 
 def _key_figures(record: NetworkRecord) -> Iterator[tuple[str, str]]:
@@ -166,10 +168,3 @@ def _equipped(record: NetworkRecord, ranked: tuple[RankedSite, ...]) -> Iterator
     )
     figure = "Road seen" if record.criterion == "road" else "Returns"
     yield Table(("Rank", "Site", "Sensors", "Money", figure, "Gain per $1,000"), rows, frozenset({0, 3, 4, 5}))
-
-
-def _failed(ranked: tuple[RankedSite, ...]) -> Iterator[Block]:
-    rows = tuple((one.site.name, one.site.message) for one in ranked if one.site.status == "failed")
-    if rows:
-        yield Paragraph("The figures of the network leave these sites out.")
-        yield Table(("Site", "Reason"), rows)

@@ -2,7 +2,7 @@
 
 import math
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import Any, Literal
 
 from matplotlib.artist import Artist
@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ...estimates import IntervalEstimate
-from .drawing import new_page, save_png
+from .drawing import Window, new_page, save_png, window_around
 from .palette import INK, SERIES_COLOURS, SOFT_INK
 
 MARKERS = ("o", "s", "^", "D", "v", "P", "X")  # one more than colours, so that pairs repeat only after 42 series
@@ -36,15 +36,15 @@ def new_figure(
     return figure, list(figure.subplots(1, panels, sharey=sharey, squeeze=False)[0])
 
 
-def limits_around(bounds: Iterable[float], margin: float) -> tuple[dict[str, Any], float]:
+def limits_around(bounds: Window, margin: float) -> tuple[dict[str, Any], float]:
     """Return the limits of a plan around (left, bottom, right, top), with a relative margin, and its shape.
 
     The shape is how many times as high as wide it is.
     """
     left, bottom, right, top = bounds
-    around = margin * max(right - left, top - bottom)
-    limits = {"xlim": (left - around, right + around), "ylim": (bottom - around, top + around), "aspect": "equal"}
-    return limits, (top - bottom + 2 * around) / (right - left + 2 * around)
+    left, bottom, right, top = window_around(bounds, margin * max(right - left, top - bottom))
+    limits = {"xlim": (left, right), "ylim": (bottom, top), "aspect": "equal"}
+    return limits, (top - bottom) / (right - left)
 
 
 def style_axes(panel: Axes, x: str = "", y: str = "", grid: Literal["both", "x", "y"] = "both", **font: Any) -> None:  # noqa: ANN401 -- matplotlib's own

@@ -158,14 +158,14 @@ def close_ups(sheet: bytes, count: int) -> list[tuple[bytes, ...]]:
         across, rows = picture.width // TILE[0], min(count, MOST)
         if picture.size != (across * TILE[0], rows * TILE[1]) or across not in {1, 2}:
             raise ValueError(f"a sheet of {picture.width} by {picture.height} pixels, not of {count} sensors")
-        return [tuple(_tile(picture, column, row) for column in range(across)) for row in range(rows)]
-
-
-def _tile(sheet: Image.Image, column: int, row: int) -> bytes:
-    left, top = column * TILE[0], row * TILE[1]
-    content = io.BytesIO()
-    sheet.crop((left, top, left + TILE[0], top + TILE[1])).save(content, format="PNG")
-    return content.getvalue()
+        tiles = []
+        for row in range(rows):
+            corners = [(column * TILE[0], row * TILE[1]) for column in range(across)]
+            contents = [io.BytesIO() for _ in corners]
+            for (left, top), content in zip(corners, contents, strict=True):
+                picture.crop((left, top, left + TILE[0], top + TILE[1])).save(content, format="PNG")
+            tiles.append(tuple(content.getvalue() for content in contents))
+        return tiles
 
 
 @dataclass(frozen=True, eq=False)

@@ -103,6 +103,21 @@ def draw_polygons(axes: Axes, polygons: Iterable[Float], **style: Any) -> None: 
     axes.add_collection(PolyCollection(list(polygons), **style), autolim=False)
 
 
+def window_around(bounds: Iterable[float], margin: float, shapes: tuple[float, float] = (0.0, np.inf)) -> Window:
+    """Return the window around (left, bottom, right, top) with a margin, as high as wide times a number in ``shapes``.
+
+    Examples
+    --------
+    >>> window_around((0.0, 0.0, 40.0, 10.0), 5.0, shapes=(0.5, 1.0))
+    (-5.0, -7.5, 45.0, 17.5)
+    """
+    left, bottom, right, top = bounds
+    width, height = right - left + 2 * margin, top - bottom + 2 * margin
+    width, height = max(width, height / shapes[1]), max(height, width * shapes[0])
+    x, y = (left + right) / 2, (bottom + top) / 2
+    return x - width / 2, y - height / 2, x + width / 2, y + height / 2
+
+
 def add_axes(
     figure: Figure, left: float, bottom: float, width: float, height: float, window: Window | None = None
 ) -> Axes:

@@ -50,7 +50,9 @@ def place_callouts(  # what a label must keep off is of several kinds
         tried = _places(anchor, half + 2.0 * clearance, anchor - middle)
         inside = np.all((tried - half >= low) & (tried + half <= high), axis=1)
         free = inside & _is_apart(tried, half + clearance, taken_low, taken_high)
-        cost = np.where(free, _hidden(tried - half, tried + half, subject) + DISTANCE_COSTS, np.inf)
+        within = (subject > (tried - half)[:, None]) & (subject < (tried + half)[:, None])
+        hidden = np.all(within, axis=2).sum(axis=1)  # points of the subject; the most of all places cost 1
+        cost = np.where(free, hidden / max(1, hidden.max()) + DISTANCE_COSTS, np.inf)
         best = int(np.argmin(cost))
         if np.isfinite(cost[best]):
             centre = tried[best]
@@ -109,13 +111,6 @@ def _places(anchor: Float, reach: Float, outwards: Float) -> Float:
     angle = start + np.pi * 2.0 / LABEL_DIRECTIONS * ((turn + 1) // 2) * np.where(turn % 2, 1.0, -1.0)
     round_anchor = np.stack((np.cos(angle), np.sin(angle)), axis=1) * reach
     return np.concatenate([anchor + factor * round_anchor for factor in LABEL_DISTANCES])
-
-
-def _hidden(low: Float, high: Float, subject: Float) -> Float:
-    """Return how much of the subject each box hides, the most of them 1."""
-    inside = np.all((subject > low[:, None]) & (subject < high[:, None]), axis=2).sum(axis=1)
-    share: Float = inside / max(1, inside.max())
-    return share
 
 
 MOST_LABELS = 60

@@ -32,6 +32,7 @@ from .drawing import (
     new_page,
     percent,
     save_png,
+    window_around,
     wrapped,
 )
 from .palette import FORBIDDEN, INK, MANDATORY, SOFT_INK, WEIGHTED
@@ -130,14 +131,12 @@ def _window(shown: BaseGeometry) -> tuple[Window, float]:
     The margin is larger where the scale or the north arrow would hide part of the region.
     """
     left, bottom, right, top = shown.bounds
-    around = 2 * max(MARGIN_SHARE * max(right - left, top - bottom), MIN_MARGIN)
-    x, y, width, height = (left + right) / 2, (bottom + top) / 2, right - left + around, top - bottom + around
-    map_height = min(max(MAP_WIDTH * height / width, MIN_MAP_HEIGHT), MAX_MAP_HEIGHT)
-    shape = map_height / MAP_WIDTH
-    width, height = max(width, height / shape), max(height, width * shape)
-    windows = [
-        (x - room * width / 2, y - room * height / 2, x + room * width / 2, y + room * height / 2) for room in ROOMS
-    ]
+    margin = max(MARGIN_SHARE * max(right - left, top - bottom), MIN_MARGIN)
+    first = window_around(shown.bounds, margin, (MIN_MAP_HEIGHT / MAP_WIDTH, MAX_MAP_HEIGHT / MAP_WIDTH))
+    x, y, width, height = first[0] + first[2], first[1] + first[3], first[2] - first[0], first[3] - first[1]
+    map_height = MAP_WIDTH * height / width
+    rooms = [(room * width, room * height) for room in ROOMS]
+    windows = [((x - wide) / 2, (y - high) / 2, (x + wide) / 2, (y + high) / 2) for wide, high in rooms]
     for one in windows:
         if not any(shown.intersects(shapely.box(*box)) for box in corner_boxes(one, (one[2] - one[0]) / MAP_WIDTH)):
             return one, map_height

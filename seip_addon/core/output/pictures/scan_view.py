@@ -26,6 +26,7 @@ from .drawing import (
     draw_polygons,
     new_page,
     save_png,
+    window_around,
 )
 from .palette import INK, MAX_INTENSITY, PAPER, SEEN_COLOURS, SOFT_INK
 from .plan_map import draw_area
@@ -57,12 +58,12 @@ def save_scan_view(
         Credits that the sources of the scene demand.
     """
     west, south, east, north = region.bounds
-    left, bottom, right, top = region.buffer(MARGIN_SHARE * max(east - west, north - south)).bounds
+    window = window_around(region.bounds, MARGIN_SHARE * max(east - west, north - south))
+    left, bottom, right, top = window
     tall = MAP_SIDE * (top - bottom) / (right - left)
     figure = new_page((2 * MAP_SIDE + 3 * MARGIN, tall + HEAD + FOOT), DPI)
     kinds: tuple[By, ...] = ("sensor", "intensity")
     for number, by in enumerate(kinds):
-        window = (left, bottom, right, top)
         axes = add_axes(figure, MARGIN + number * (MAP_SIDE + MARGIN), FOOT, MAP_SIDE, tall, window)
         axes.set(facecolor=BACKGROUND_COLOUR)
         _draw_points(axes, frame.points, cloud_colours(frame, by)[:, :3])

@@ -16,13 +16,15 @@ from ..pictures.drawing import (
     draw_callouts,
     draw_corners,
     new_page,
+    window_around,
 )
 from ..pictures.palette import INK, PAPER, SEEN_COLOURS, SOFT_INK
 from .blind_spots import BlindSpot
 from .evidence import Evidence
 
 DPI = 150
-MAP_WIDTH, MIN_MAP_HEIGHT, MAX_MAP_HEIGHT = 7.2, 4.0, 8.0  # inches
+MAP_WIDTH = 7.2  # inches
+MAP_SHAPES = (4.0 / MAP_WIDTH, 8.0 / MAP_WIDTH)  # least and largest height, in widths
 MARGIN = 6.0  # metres around the road
 CHART_SIZE = (7.2, 3.6)  # inches
 NUMBER_SIZE = 10.0  # points
@@ -34,7 +36,8 @@ def blind_spot_map(evidence: Evidence, spots: Sequence[BlindSpot]) -> bytes:
     targets = evidence.site.targets
     x, y = targets.xyz[:, 0], targets.xyz[:, 1]
     sensors = np.array([sensor.local_m[:2] for sensor in evidence.sensors]).reshape(-1, 2)
-    window = _window(np.vstack((targets.xyz[:, :2], sensors)))
+    points = np.vstack((targets.xyz[:, :2], sensors))
+    window = window_around((*points.min(axis=0).tolist(), *points.max(axis=0).tolist()), MARGIN, MAP_SHAPES)
     page = (MAP_WIDTH, MAP_WIDTH * (window[3] - window[1]) / (window[2] - window[0]))
     figure = new_page(page, DPI)
     axes = add_axes(figure, 0.0, 0.0, *page, window)
@@ -59,16 +62,6 @@ def blind_spot_map(evidence: Evidence, spots: Sequence[BlindSpot]) -> bytes:
     for number, (right, up) in enumerate(_apart(middles, 0.24 * inch).tolist(), start=1):
         axes.text(right, up, str(number), bbox=circle, **style)
     return as_png(figure)
-
-
-def _window(points: Float) -> tuple[float, float, float, float]:
-    """Return left, bottom, right and top of a map of points (n, 2) that fits the page."""
-    low, high = points.min(axis=0) - MARGIN, points.max(axis=0) + MARGIN
-    width, height = (high - low).tolist()
-    width = max(width, MAP_WIDTH / MAX_MAP_HEIGHT * height)
-    height = max(height, MIN_MAP_HEIGHT / MAP_WIDTH * width)
-    x, y = ((low + high) / 2).tolist()
-    return x - width / 2, y - height / 2, x + width / 2, y + height / 2
 
 
 def _apart(points: Float, distance: float) -> Float:

@@ -236,8 +236,8 @@ def _verification(evidence: Evidence) -> Iterator[Block]:
         yield Picture(
             evidence.pictures["returns.png"],
             "Share of the beams that return from each kind of surface, by distance: recorded (marks), promised "
-            "(dotted) and with the gain of the unit (lines). It is the power that the unit receives, as a multiple of "
-            "what its model says.",
+            "(dotted) and with the gain of the unit (lines). The gain is the power that the unit receives, as a "
+            "multiple of that in its model.",
         )
     yield from _changes(evidence, objects(found))
     standing = vehicles(found)
@@ -450,8 +450,8 @@ def _front(evidence: Evidence) -> Iterator[Block]:
             )
             for point in record.front
         ]
-        weighted = " Coverage is weighted here." if np.ptp(evidence.site.problem.weights) > 0 else ""
-        measured, head, own = f"see:{weighted}", "Seen", 100 * _weighted_share(evidence)
+        weighted = ", by its weights" if np.ptp(evidence.site.problem.weights) > 0 else ""
+        measured, head, own = f"see these shares of the road{weighted}.", "Seen", 100 * _weighted_share(evidence)
         label, highest = "road seen, %", 100.0
     else:
         rows = []

@@ -59,16 +59,7 @@ LEFT_OUT = {"roll_deg", "installation_usd", "returns", "judgement"}  # if they a
 
 @dataclass(frozen=True)
 class Provenance:
-    """When and with what a placement was made: what may differ where the placement does not.
-
-    Parameters
-    ----------
-    created : datetime
-        With its time zone.
-    durations : mapping of str to float, seconds
-    versions : mapping of str to str
-        Versions of the program and its libraries; see `versions`.
-    """
+    """Time of a placement with its time zone, seconds of each step, and versions; see `versions`."""
 
     created: datetime
     durations: Mapping[str, float]
