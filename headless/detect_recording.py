@@ -392,7 +392,7 @@ def _key(options: argparse.Namespace, recording: Recording, detector: Detector) 
     files = [path for record in recording.sensors for path in record.paths]
     sources = [path for path in (options.poses, options.site, *options.catalogue) if path is not None]
     return digest(
-        source_digest(__name__),
+        source_digest("headless"),
         detector.key,
         repr((options.sensor, options.radius)),
         *(f"{path.name} {path.stat().st_size} {path.stat().st_mtime_ns}" for path in files),

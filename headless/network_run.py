@@ -25,7 +25,7 @@ from headless.network_tasks import (
 import numpy as np
 
 from seip_addon.core.arrays import Float
-from seip_addon.core.choosing.network import network_search, site_problem
+from seip_addon.core.choosing.network import network_search
 from seip_addon.core.choosing.network.frontier import Frontier, SolvedBudget
 from seip_addon.core.choosing.network.network_search import Goal, NetworkAllocation, Request, search_allocations
 from seip_addon.core.choosing.network.site_problem import SiteProblem
@@ -180,7 +180,7 @@ def _surveyed(
     folder: Path,
 ) -> Generator[Progress, None, list[_Site]]:
     """Survey the sites whose inputs have changed; read the others."""
-    version = source_digest(site_problem.__name__)
+    version = source_digest()
     sites: list[_Site] = []
     open_numbers: list[int] = []
     for number, place in enumerate(places):
@@ -364,7 +364,7 @@ def _placed(
     """Write the files of the placements that are taken, except those that an earlier run has written."""
     wanted: list[tuple[_Site, SolvedBudget, str]] = []
     for site, one in zip(sites, taken, strict=True):
-        key = digest(site.key, source_digest("headless.network_site"), json.dumps(as_json(one)))
+        key = digest(site.key, source_digest("headless"), json.dumps(as_json(one)))
         mark = site.folder / "placed.key"
         known = mark.read_text(encoding="ascii") if mark.is_file() else ""
         if one.chosen and known == key:

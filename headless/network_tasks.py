@@ -94,7 +94,7 @@ class Failure:
 
 def survey_version() -> str:
     """Return a digest of the code that surveys a site."""
-    return source_digest("headless.network_site")
+    return source_digest("headless")
 
 
 def survey_site(job: SurveyJob) -> Files | Failure:

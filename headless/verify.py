@@ -22,15 +22,13 @@ import bpy
 
 from seip_addon.core.counts import counted
 from seip_addon.core.errors import SeipError
-from seip_addon.core.output.pictures.verification import save_changes_picture, save_returns_chart
 from seip_addon.core.output.results.versions import versions
 from seip_addon.core.sensing.recordings.comparison import VEHICLE
 from seip_addon.core.sensing.recordings.recording import open_recording
 from seip_addon.core.sensing.recordings.verification import Verification
 from seip_addon.core.sensing.visibility.settings import VisibilitySettings
-from seip_addon.core.storage.files import save_json
 from seip_addon.core.workflows.survey_settings import SurveySettings
-from seip_addon.core.workflows.verification_record import CHANGES_FILE, save_changes, save_units, verification_record
+from seip_addon.core.workflows.verification_record import UNITS_FILE, write_verification
 from seip_addon.core.workflows.verifying import verify
 from seip_addon.scene.blend_file import save_blend
 from seip_addon.scene.corrections import correct_scene
@@ -53,18 +51,14 @@ def main(argv: list[str]) -> None:
     folder = options.output
     runtime.warn(found.warnings)
     with runtime.incomplete_if_interrupted(folder):
-        save_changes_picture(folder / "changes.png", geometry, planned, found)
-        save_returns_chart(folder / "returns.png", found)
-        save_changes(folder / CHANGES_FILE, found)
-        units = save_units(folder / "units.toml", recording.name, found)
+        made_with = versions(blender=bpy.app.version_string)
+        write_verification(folder, geometry, planned, recording.name, found, made_with)
         runtime.warn(correct_scene(bpy.context.scene, found))
         save_blend(folder / "verified.blend")
-        record = verification_record(geometry.name, recording.name, found)
-        save_json(folder / "verification.json", record | {"versions": versions(blender=bpy.app.version_string)})
     for line in _lines(found):
         runtime.print_line(line)
     written = "verified.blend, changes.png, changes.csv, returns.png, verification.json"
-    runtime.print_line(f"written to {folder}/: {written}{', units.toml' * bool(units)}")
+    runtime.print_line(f"written to {folder}/: {written}{f', {UNITS_FILE}' * (folder / UNITS_FILE).exists()}")
 
 
 def _lines(found: Verification) -> list[str]:

@@ -23,13 +23,5 @@ def remove() -> None:
             tidy_pieces(scene)
 
 
-def attach() -> None:
-    """Watch for buildings and sensors that are deleted."""
-    bpy.app.handlers.depsgraph_update_post.append(_on_update)
-
-
-def detach() -> None:
-    """Watch no longer."""
-    bpy.app.handlers.depsgraph_update_post.remove(_on_update)
-    if bpy.app.timers.is_registered(remove):
-        bpy.app.timers.unregister(remove)
+HANDLERS = (("depsgraph_update_post", _on_update),)
+TIMERS = (remove,)

@@ -1,7 +1,9 @@
 """Registration of the add-on's classes, in order."""
 
 import importlib
+from collections.abc import Callable, Iterator
 from types import ModuleType
+from typing import Any
 
 import bpy
 
@@ -18,10 +20,11 @@ PARTS = (
     "operators.verification",
     "panels.sensors", "panels.site", "panels.placement", "panels.results", "panels.steps", "panels.front_door",
 )  # fmt: skip
-"""Modules of the add-on; most have ``CLASSES``.
+"""Modules of the add-on, whose classes are registered in the order of their definition.
 
-Some have ``attach`` and ``detach`` for what is no class: handlers, properties,
-menus; and some ``forget``, for what must not outlive the open file.
+Other registrations are in tables of the module: ``PROPERTIES`` (owner, name, property), ``HANDLERS`` (event, function),
+``MENUS`` (menu, function), ``AT_START`` (functions to call once the open file can be read) and ``TIMERS`` (functions
+that may be waiting). A function ``forget`` ends what must not outlive the open file.
 """
 
 _registered: list[ModuleType] = []
@@ -34,11 +37,10 @@ def register() -> None:
     except ImportError as error:
         parts = [_incomplete(error)]
     for part in parts:
-        for one in getattr(part, "CLASSES", ()):
+        for one in _classes(part):
             bpy.utils.register_class(one)
         _registered.append(part)
-        if hasattr(part, "attach"):
-            part.attach()
+        _attach(part)
     bpy.app.handlers.load_pre.append(_forget)
 
 
@@ -48,10 +50,45 @@ def unregister() -> None:
     _forget()
     while _registered:
         part = _registered.pop()
-        if hasattr(part, "detach"):
-            part.detach()
-        for one in reversed(getattr(part, "CLASSES", ())):
+        _detach(part)
+        for one in reversed(_classes(part)):
             bpy.utils.unregister_class(one)
+
+
+def _attach(part: ModuleType) -> None:
+    """Add the entries of a module's tables to Blender."""
+    for owner, name, value in getattr(part, "PROPERTIES", ()):
+        setattr(owner, name, value)
+    for functions, function in _lists(part):
+        functions.append(function)
+    for function in getattr(part, "AT_START", ()):
+        if isinstance(bpy.data, bpy.types.BlendData):
+            function()
+        else:  # Blender lets nobody look at the open file while it registers an add-on
+            bpy.app.timers.register(function, first_interval=0.0)
+
+
+def _detach(part: ModuleType) -> None:
+    """Remove what `_attach` added, and cancel timers."""
+    for function in (*getattr(part, "TIMERS", ()), *getattr(part, "AT_START", ())):
+        if bpy.app.timers.is_registered(function):
+            bpy.app.timers.unregister(function)
+    for functions, function in _lists(part):
+        functions.remove(function)
+    for owner, name, _ in getattr(part, "PROPERTIES", ()):
+        delattr(owner, name)
+
+
+def _lists(part: ModuleType) -> Iterator[tuple[Any, Callable[..., None]]]:
+    """Yield Blender's lists of handlers, and its menus, with the functions that a module has for them."""
+    yield from ((getattr(bpy.app.handlers, event), function) for event, function in getattr(part, "HANDLERS", ()))
+    yield from ((getattr(bpy.types, menu), function) for menu, function in getattr(part, "MENUS", ()))
+
+
+def _classes(part: ModuleType) -> list[type]:
+    """Return the classes for Blender that a module defines, in order."""
+    own = (one for one in vars(part).values() if isinstance(one, type) and one.__module__ == part.__name__)
+    return [one for one in own if issubclass(one, bpy.types.bpy_struct)]
 
 
 @bpy.app.handlers.persistent  # type: ignore[untyped-decorator]

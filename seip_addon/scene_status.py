@@ -11,6 +11,7 @@ import bpy
 
 from .core.errors import SeipError
 from .core.output.results.placement_record import parsed_record
+from .core.site.candidates import CandidateSettings
 from .core.workflows.survey_settings import SurveySettings
 from .scene import contract
 from .scene.sensors import labelled_sensors
@@ -26,6 +27,7 @@ ANOTHER_SITE = "The scene or its settings have changed since this placement: pla
 NO_SITE = "There is no site yet."
 UNEVALUATED = "There are sensors without figures in the scene: evaluate them."
 OLD_CHECK = "Checked before the file was opened: check again."
+OTHER_SENSORS = "The sensors or their heights have changed since: check again to count their poses."
 
 
 def not_own(scene: bpy.types.Scene) -> str:
@@ -137,7 +139,14 @@ def stale_check(scene: bpy.types.Scene) -> str:
         return OLD_CHECK
     if check.watch.changed:
         return "The scene has changed since the check."
-    return "" if check.settings == checked_settings(scene) else "The settings have changed since the check."
+    settings = checked_settings(scene)
+    if check.settings == settings:
+        return ""
+    return (
+        OTHER_SENSORS
+        if _of_site(check.settings) == _of_site(settings)
+        else "The settings have changed since the check."
+    )
 
 
 def checked_settings(scene: bpy.types.Scene) -> SurveySettings | str:
@@ -146,6 +155,15 @@ def checked_settings(scene: bpy.types.Scene) -> SurveySettings | str:
         return _without_search(scene.seip.survey.settings())
     except SeipError as error:
         return str(error)
+
+
+def _of_site(settings: SurveySettings | str) -> SurveySettings | str:
+    """Return settings with the default sensors, heights and tilts."""
+    if isinstance(settings, str):
+        return settings
+    usual = CandidateSettings()
+    candidates = replace(settings.candidates, sensors=usual.sensors, heights=usual.heights, tilts=usual.tilts)
+    return replace(settings, candidates=candidates)
 
 
 def same_grid(one: SurveySettings, other: SurveySettings) -> bool:

@@ -189,17 +189,5 @@ HANDLERS = (
 )
 
 
-def attach() -> None:
-    """Watch scenes, and compare a placement with its scene whenever a file is opened."""
-    for event, handler in HANDLERS:
-        getattr(bpy.app.handlers, event).append(handler)
-    _after_load()
-
-
-def detach() -> None:
-    """Watch no longer."""
-    for event, handler in HANDLERS:
-        getattr(bpy.app.handlers, event).remove(handler)
-    for timer in (_compare, look_again):
-        if bpy.app.timers.is_registered(timer):
-            bpy.app.timers.unregister(timer)
+AT_START = (_after_load,)
+TIMERS = (_compare, look_again)

@@ -14,10 +14,15 @@ def select_sensor(result: bpy.types.PropertyGroup, context: bpy.types.Context) -
     empty = placed_sensors(context.scene).get(result.sensors[result.active_sensor].name)
     if empty is None or empty.name not in context.view_layer.objects:
         return
-    for obj in context.selected_objects:
-        obj.select_set(state=False)
-    empty.select_set(state=True)
-    context.view_layer.objects.active = empty
+    select_alone(context, empty)
+
+
+def select_alone(context: bpy.types.Context, obj: bpy.types.Object) -> None:
+    """Select an object, and nothing else, and make it active."""
+    for other in context.selected_objects:
+        other.select_set(state=False)
+    obj.select_set(state=True)
+    context.view_layer.objects.active = obj
 
 
 def search_positions(_goal: bpy.types.PropertyGroup, context: bpy.types.Context, text: str) -> Iterator[str]:

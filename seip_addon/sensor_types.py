@@ -59,9 +59,11 @@ def list_types(scene: bpy.types.Scene) -> None:
 
 @bpy.app.handlers.persistent  # type: ignore[untyped-decorator]
 def _after_load(*_: object) -> None:
-    """List the types; where a command has placed sensors, use their types if none of them was chosen."""
+    """List the types, and take over placements of commands; without a record use the types of the sensors."""
     refresh()
     for scene in bpy.data.scenes:
+        if scene.library is None:
+            scene.seip.take_over_placement()
         if scene.library is None and scene_status.has_unevaluated(scene):
             there = {obj.get(contract.SENSOR) for obj in labelled_sensors(scene, hidden=True).values()}
             if not there & set(scene.seip.survey.used_types()):
@@ -69,18 +71,5 @@ def _after_load(*_: object) -> None:
                     one.use = one.name in there
 
 
-def attach() -> None:
-    """List the types now, and whenever a file is opened."""
-    bpy.app.handlers.load_post.append(_after_load)
-    if isinstance(bpy.data, bpy.types.BlendData):
-        refresh()
-    else:  # Blender lets nobody look at the open file while it registers an add-on
-        bpy.app.timers.register(refresh, first_interval=0.0)
-
-
-def detach() -> None:
-    """Forget them."""
-    if bpy.app.timers.is_registered(refresh):
-        bpy.app.timers.unregister(refresh)
-    bpy.app.handlers.load_post.remove(_after_load)
-    session.sensor_types.clear()
+HANDLERS = (("load_post", _after_load),)
+AT_START = (_after_load,)

@@ -321,10 +321,6 @@ def scene_of(number: int) -> bpy.types.Scene:
 
 
 def forget() -> None:
-    """Let go of what is known of the open file, and have work that is under way end."""
+    """Let go of what is known of the open file."""
     session.scenes.clear()
     session.places = None
-    if session.running is not None:
-        session.running.stop = True
-        session.running.work.stop()
-        session.running = None

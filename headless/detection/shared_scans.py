@@ -124,7 +124,7 @@ def _path(
 ) -> Path:
     """Return the file of what is detected in frames of a run with a placement."""
     scans = frames_key(shared.simulator, shared.placements[placement], [run])
-    key = digest(source_digest(__name__), scans, str(list(numbers)), detector.key)
+    key = digest(source_digest("headless.detection"), scans, str(list(numbers)), detector.key)
     return folder / FOLDER / f"{key[:32]}.npz"
 
 

@@ -23,7 +23,6 @@ from torch.utils.data import DataLoader, Dataset
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import Progress
-from seip_addon.core.storage.files import digest
 from seip_addon.core.storage.source_digest import source_digest
 
 from .average_precision import evaluate
@@ -35,7 +34,6 @@ from .frames import SampledRecording, TrainingSample, drawn, require_separate, s
 from .inference import detect_on_level
 from .matching import Rule
 from .pillars import PillarGrid, Pillars, fill_pillars, grid_over, stacked
-from .recordings import SampledRun
 from .settings import BOTTOM, CLASS_CATEGORIES, TOP, NetworkSettings, TrainingSettings
 
 VALIDATION_FRAMES = 18  # frames of each validation, spread over the recordings set aside
@@ -247,7 +245,7 @@ class _Run:
                     "settings": asdict(self.settings),
                     "recordings": self._sources(),
                     "start": self.start,
-                    "program": _program(),
+                    "program": source_digest("headless.detection"),
                     "step": self.step,
                     "curve": asdict(self.curve),
                     "weights": _copied(self.detector.state_dict()),
@@ -267,7 +265,7 @@ class _Run:
             and earlier.get("settings") == asdict(self.settings)
             and earlier.get("recordings") == self._sources()
             and earlier.get("start") == self.start
-            and earlier.get("program") == _program()
+            and earlier.get("program") == source_digest("headless.detection")
         )
         if not same:
             raise SeipError(
@@ -311,11 +309,6 @@ class _Batches(Dataset[_Batch]):
         pillars = stacked([fill_pillars(one.points, self._grid, self._most_points) for one in varied], self._grid)
         targets = [_targets(one, self._settings.least_points) for one in varied]
         return pillars, self._target_maps(targets, self._grid, LOSS_MARGIN)
-
-
-def _program() -> str:
-    """Return a digest of the code that a training follows from."""
-    return digest(*(source_digest(name) for name in (__name__, SampledRun.__module__)))
 
 
 def _with_frames(recordings: Sequence[SampledRecording]) -> list[SampledRecording]:

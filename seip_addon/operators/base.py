@@ -238,10 +238,7 @@ class SEIP_OT_accept(Conditional, bpy.types.Operator):
         return {"FINISHED"}
 
 
-CLASSES = (SEIP_OT_stop, SEIP_OT_accept)
-
-
-def detach() -> None:
+def forget() -> None:
     """Stop running work: when the add-on is disabled Blender drops its modal operators without calling `cancel`."""
     if (running := session.running) is not None:
         _stop(running)

@@ -83,14 +83,21 @@ class SEIP_OT_detect(Conditional, LongWork[str], bpy.types.Operator):
 
 
 def _detected(job: DetectionJob, folder: Path) -> Generator[Progress, None, str]:
-    with (
-        folder_of_result(folder),
-        TemporaryDirectory(prefix=unfinished_name(folder, "detection-").name, dir=folder) as temporary,
-    ):
-        scene = Path(temporary) / "placed.blend"
-        save_blend(scene)
+    with saved_scene(folder) as scene:
         yield Progress(0, 0, "starting PyTorch")
         return (yield from detect_elsewhere(job, scene, folder))
+
+
+@contextmanager
+def saved_scene(folder: Path) -> Iterator[Path]:
+    """Save the scene as it is in a folder of results, for another process, and remove it at the end."""
+    with (
+        folder_of_result(folder),
+        TemporaryDirectory(prefix=unfinished_name(folder, "scene-").name, dir=folder) as temporary,
+    ):
+        path = Path(temporary) / "scene.blend"
+        save_blend(path)
+        yield path
 
 
 @contextmanager
@@ -104,6 +111,3 @@ def folder_of_result(folder: Path) -> Iterator[None]:
         with suppress(OSError):  # it holds something
             for one in new:
                 one.rmdir()
-
-
-CLASSES = (SEIP_OT_detect,)

@@ -5,9 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Generator
 from dataclasses import replace
-from datetime import UTC, datetime
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import bpy
 
@@ -17,23 +15,18 @@ from ..core.choosing.placement.objective import Objective, check_objective
 from ..core.counts import counted
 from ..core.errors import SeipError
 from ..core.output.results.answer import answer
-from ..core.output.results.placement_record import Provenance
-from ..core.output.results.versions import versions
 from ..core.progress import Progress
-from ..core.storage.files import unfinished_name
 from ..core.workflows.detection import DetectionJob
 from ..core.workflows.finalists import check_judged, find_finalists, judge_elsewhere, judged_solution
 from ..core.workflows.placing import place, with_context
-from ..core.workflows.records import record_of
 from ..core.workflows.survey import Survey
 from ..core.workflows.traffic_runs import found_runs, read_runs
 from ..properties.conversion import output_folder, runs_folder
-from ..scene.blend_file import save_blend
 from ..scene.write import write_result
 from ..session import SceneState, session
 from ..viewport import coverage
 from .base import Conditional, ForReadyScene, LongWork, Outcome, ShortWork, started
-from .detection import NO_PYTHON, folder_of_result, no_python
+from .detection import NO_PYTHON, no_python, saved_scene
 from .results import keep_result
 
 
@@ -79,10 +72,8 @@ class _Placing(LongWork[SceneState]):
     def conclude(self, scene: bpy.types.Scene, result: SceneState) -> None:
         """Put the sensors into the scene, and all that is needed to go on later into the file."""
         survey, solution = result.placed()
-        provenance = Provenance(datetime.now(UTC), result.durations, versions(blender=bpy.app.version_string))
-        record = record_of(survey, solution, provenance)
         write_result(scene, survey.site, solution.deployment)
-        keep_result(scene, result, record)
+        record = keep_result(scene, result)
         coverage.show_colours(scene)
         self.report({"INFO"}, " ".join(answer(record)[:2]))  # type: ignore[attr-defined]  # of Blender's operators
 
@@ -106,7 +97,7 @@ class SEIP_OT_judge_placement(Conditional, _Placing, bpy.types.Operator):
     """Place sensors, and choose among twelve good placements by what a detector finds with them in runs of traffic; runs in a separate Python with PyTorch"""  # noqa: E501  # a tooltip is one line
 
     bl_idname = "seip.judge_placement"
-    bl_label = "Judge by Detection"
+    bl_label = "Choose by Detection"
 
     obstacles = (scene_status.obstacle, no_python)
 
@@ -132,12 +123,7 @@ def _judged(
     acceptance: Acceptance,
 ) -> Generator[Progress, None, SceneState]:
     """Place sensors, and choose among finalists; detections are kept in a folder."""
-    with (
-        folder_of_result(folder),
-        TemporaryDirectory(prefix=unfinished_name(folder, "judging-").name, dir=folder) as temporary,
-    ):
-        scene = Path(temporary) / "site.blend"
-        save_blend(scene)
+    with saved_scene(folder) as scene:
         yield Progress(0, 0, "placing sensors")
         state = yield from _placed(surveying, objective, None, acceptance)
         survey, solution = state.placed()
@@ -205,13 +191,3 @@ class SEIP_OT_add_rule(ShortWork, bpy.types.Operator):
         entry.name, entry.rule = name, rule
         goal.active_rule = goal.rules.find(name)
         goal.position = ""
-
-
-CLASSES = (
-    SEIP_OT_compute_visibility,
-    SEIP_OT_compare_scene,
-    SEIP_OT_solve_placement,
-    SEIP_OT_judge_placement,
-    SEIP_OT_choose_number,
-    SEIP_OT_add_rule,
-)

@@ -251,10 +251,6 @@ def _set_up(finding: Generator[Progress, None, SceneState]) -> Generator[Progres
     return state, visibility, SensorReturns(state.layout, solution.objective) if of_returns else None
 
 
-def _nothing_to_evaluate(scene: bpy.types.Scene) -> str:
-    return "" if scene_status.has_unevaluated(scene) else no_placement(scene)
-
-
 class SEIP_OT_evaluate_sensors(ForReadyScene, LongWork[SceneState], bpy.types.Operator):
     """Evaluate the sensors of the scene at their present poses, and make them the placement"""
 
@@ -280,10 +276,7 @@ class SEIP_OT_evaluate_sensors(ForReadyScene, LongWork[SceneState], bpy.types.Op
         """Make the sensors at their present poses the placement."""
         survey, solution = result.placed()
         take_over(scene, survey.site, solution.deployment, labelled_sensors(scene, hidden=True))
-        provenance = Provenance(datetime.now(UTC), result.durations, versions(blender=bpy.app.version_string))
-        record = record_of(survey, solution, provenance)
-        keep_result(scene, result, record)
-        self.report({"INFO"}, answer(record)[0])
+        self.report({"INFO"}, answer(keep_result(scene, result))[0])
 
 
 def _evaluated(
@@ -297,20 +290,18 @@ def _evaluated(
     return replace(state, solution=solution)
 
 
-def keep_result(scene: bpy.types.Scene, state: SceneState, record: PlacementRecord) -> None:
-    """Have the scene keep a placement that stands in it, all that is needed to go on later included."""
+def keep_result(scene: bpy.types.Scene, state: SceneState) -> PlacementRecord:
+    """Store the placement whose sensors are in the scene, with all that is needed to go on later; return its record."""
     survey, solution = state.placed()
+    provenance = Provenance(datetime.now(UTC), state.durations, versions(blender=bpy.app.version_string))
+    record = record_of(survey, solution, provenance)
     live_coverage.stop()
     kept = scene.seip.result
     kept.change = "" if no_placement(scene) else change_text(record, parsed_record(kept.record))
-    kept.record = record.text()
-    kept.targets = digest(survey.site.targets.xyz)
-    kept.seen = packed_counts(solution.deployment.seen_by)
-    kept.sensors.clear()
-    for sensor in solution.deployment.sensors:
-        kept.sensors.add().name = sensor.label
+    kept.keep(record.text(), digest(survey.site.targets.xyz), packed_counts(solution.deployment.seen_by))
     bpy.context.window_manager.seip_sections.follow_steps()
     session.of(scene).state = replace(state, record=kept.record)
+    return record
 
 
 class _Writes(ForPlacement, LongWork[Result]):
@@ -430,15 +421,3 @@ def _holds(folder: Path, record: str, _written: int | None) -> bool:
     # The goal is compared too: with other shares of the road users, the same sensors have another value in the files.
     one, other = ((of.sensors, of.inputs, of.notes, of.request.goal) for of in (written, present))
     return one == other
-
-
-CLASSES = (
-    SEIP_OT_look_from_sensor,
-    SEIP_OT_keep_placement,
-    SEIP_OT_remove_entry,
-    SEIP_OT_show_comparison,
-    SEIP_OT_follow_sensors,
-    SEIP_OT_evaluate_sensors,
-    SEIP_OT_export_result,
-    SEIP_OT_write_report,
-)

@@ -28,7 +28,7 @@ class SEIP_OT_add_catalogue(Conditional, ShortWork, bpy.types.Operator):
     obstacles = (_no_preferences,)
 
     filepath: bpy.props.StringProperty(
-        name="File", description="The catalogue", subtype="FILE_PATH", options={"PATH_SUPPORTS_BLEND_RELATIVE"}
+        name="File", description="Catalogue file", subtype="FILE_PATH", options={"PATH_SUPPORTS_BLEND_RELATIVE"}
     )
     filter_glob: bpy.props.StringProperty(default="*.toml;*.json;*.xml;*.yaml;*.yml;*.csv", options={"HIDDEN"})
 
@@ -120,13 +120,3 @@ class SEIP_OT_add_survey_preset(AddPresetBase, bpy.types.Operator):
     preset_subdir = "seip/survey"
     preset_defines = ("survey = bpy.context.scene.seip.survey",)
     preset_values = ("survey",)
-
-
-CLASSES = (
-    SEIP_OT_add_catalogue,
-    SEIP_OT_remove_catalogue,
-    SEIP_OT_empty_cache,
-    SEIP_OT_preview_beams,
-    SEIP_MT_survey_presets,
-    SEIP_OT_add_survey_preset,
-)

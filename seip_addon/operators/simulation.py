@@ -108,6 +108,3 @@ def _simulated_on_text(name: str, text: str, *more: Any) -> Generator[Progress, 
         path = Path(folder) / (Path(name).name or _TEXT_MAP)
         path.write_text(text, encoding="utf-8")
         return (yield from simulate_runs(path, *more))
-
-
-CLASSES = (SEIP_OT_install_sumo, SEIP_OT_simulate_traffic)

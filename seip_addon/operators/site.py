@@ -7,7 +7,7 @@ from pathlib import Path
 
 import bpy
 
-from .. import preferences, scene_status, sensor_types
+from .. import preferences, scene_status, selection, sensor_types
 from ..core.counts import counted
 from ..core.errors import SeipError
 from ..core.output.results.answer import sentence
@@ -64,7 +64,7 @@ class SEIP_OT_choose_map(_WritesScene, LongWork[SitePlaces], bpy.types.Operator)
 
     filepath: bpy.props.StringProperty(
         name="File",
-        description="The map, extract or site description",
+        description="Map, extract or site description",
         subtype="FILE_PATH",
         options={"SKIP_SAVE", "PATH_SUPPORTS_BLEND_RELATIVE"},
     )
@@ -213,7 +213,7 @@ class _BuildsSite(_WritesScene, LongWork[BuiltSite]):
 
 
 class SEIP_OT_build_site(_BuildsSite, bpy.types.Operator):
-    """Model the chosen place of the map: in this scene with its camera, light and units. A site of the same place is replaced, your own objects stay; a site of another place stays, and a new scene of this file is made. Blender's cube, light and camera are removed where they are all that the scene holds"""  # noqa: E501  # a tooltip is one line
+    """Build a model of the chosen place, with camera, light and units. It replaces an earlier site of the same place; your own objects stay. If this scene has a site of another place, a new scene is made. Blender's default cube, light and camera are removed if the scene holds nothing else"""  # noqa: E501  # a tooltip is one line
 
     bl_idname = "seip.build_site"
     bl_label = "Build Site"
@@ -268,9 +268,8 @@ def _bring_to_front(scene: bpy.types.Scene) -> None:
     if window is None:
         return
     window.scene = scene
-    for area in window.screen.areas:
-        if area.type == "VIEW_3D":
-            frame_site(area, scene)
+    for area in overlays.viewports([window]):
+        frame_site(area, scene)
     overlays.open_sidebar(window)
 
 
@@ -322,7 +321,7 @@ class SEIP_OT_add_area(_WritesScene, bpy.types.Operator):
         name="Place",
         description="Position of the area",
         items=(
-            ("VIEW", "View", "In the middle of the view, as large as most of it, at the height of the 3D cursor"),
+            ("VIEW", "View", "Middle of the view, at the height of the 3D cursor, sized to the view"),
             ("CURSOR", "3D Cursor", "At the 3D cursor"),
         ),
         default="CURSOR",
@@ -336,10 +335,10 @@ class SEIP_OT_add_area(_WritesScene, bpy.types.Operator):
         min=0.1,
         soft_max=500.0,
     )
-    turn: bpy.props.FloatProperty(name="Rotation", description="Angle, counter-clockwise", subtype="ANGLE")
+    turn: bpy.props.FloatProperty(name="Rotation", description="Counter-clockwise angle", subtype="ANGLE")
     corners: bpy.props.IntProperty(
         name="Corners",
-        description="Four for a rectangle, more for an ellipse",
+        description="Number of corners: 4 for a rectangle, more for an ellipse",
         default=4,
         min=3,
         soft_max=32,
@@ -366,7 +365,7 @@ class SEIP_OT_add_area(_WritesScene, bpy.types.Operator):
         if self.place == "VIEW" and context.region_data is not None:
             middle.xy = context.region_data.view_location.xy
         obj = roles.add_area(context.scene, Role[self.role], tuple(middle), tuple(self.size), self.turn, self.corners)
-        _select_alone(context, obj)
+        selection.select_alone(context, obj)
         return {"FINISHED"}
 
 
@@ -442,7 +441,7 @@ class SEIP_OT_show_problem(ShortWork, bpy.types.Operator):
         if obstacle:
             raise SeipError(obstacle)
         obj = context.view_layer.objects[context.scene.seip.site.problems[self.number].name]
-        _select_alone(context, obj)
+        selection.select_alone(context, obj)
         _frame_selected(context)
 
 
@@ -462,13 +461,6 @@ def nothing_to_show(context: bpy.types.Context, number: int) -> str:
     return "" if context.mode == "OBJECT" else "leave Edit Mode first"
 
 
-def _select_alone(context: bpy.types.Context, obj: bpy.types.Object) -> None:
-    for other in context.selected_objects:
-        other.select_set(state=False)
-    obj.select_set(state=True)
-    context.view_layer.objects.active = obj
-
-
 def _frame_selected(context: bpy.types.Context) -> None:
     """Bring what is selected into the 3D view that was clicked in."""
     area = context.area
@@ -477,15 +469,3 @@ def _frame_selected(context: bpy.types.Context) -> None:
     region = next(region for region in area.regions if region.type == "WINDOW")
     with context.temp_override(region=region):
         bpy.ops.view3d.view_selected()
-
-
-CLASSES = (
-    SEIP_OT_choose_map,
-    SEIP_OT_download_map,
-    SEIP_OT_build_site,
-    SEIP_OT_load_example,
-    SEIP_OT_assign_role,
-    SEIP_OT_add_area,
-    SEIP_OT_check_site,
-    SEIP_OT_show_problem,
-)

@@ -8,6 +8,7 @@ import bpy
 
 from ..session import session
 from ..viewport.free_frame import free_frame
+from ..viewport.overlays import viewports
 from ..viewport.street_map import BETWEEN, HELP, StreetMap
 from .base import Outcome
 
@@ -101,8 +102,5 @@ class SEIP_OT_pick_junction(bpy.types.Operator):
 
 def viewport_of(window: bpy.types.Window | None) -> bpy.types.Area | None:
     """Return the largest 3D viewport of a window, or None."""
-    areas = [] if window is None else [area for area in window.screen.areas if area.type == "VIEW_3D"]
+    areas = [] if window is None else viewports([window])
     return max(areas, key=lambda area: area.width * area.height, default=None)
-
-
-CLASSES = (SEIP_OT_pick_junction,)

@@ -189,11 +189,3 @@ class _SceneRead:
 def _facts(trajectories: Trajectories) -> list[str]:
     begin, end = trajectories.span
     return [f"{counted(len(trajectories), 'road user')}, {begin:g} to {end:g} s", describe_categories(trajectories)]
-
-
-CLASSES = (
-    SEIP_OT_load_traffic,
-    SEIP_OT_clear_traffic,
-    SEIP_OT_scan_frame,
-    SEIP_OT_write_dataset,
-)

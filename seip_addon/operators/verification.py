@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Generator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -11,8 +11,7 @@ import bpy
 
 from .. import live_coverage, preferences, scene_status
 from ..core.errors import SeipError
-from ..core.output.pictures.verification import save_changes_picture, save_returns_chart
-from ..core.output.results.file_names import VERIFICATION_FILE, VERIFICATION_FOLDER, VERIFICATION_PICTURES
+from ..core.output.results.file_names import VERIFICATION_FOLDER, VERIFICATION_PICTURES
 from ..core.output.results.verification_record import summary
 from ..core.output.results.versions import versions
 from ..core.progress import Progress
@@ -20,16 +19,9 @@ from ..core.sensing.recordings.recording import Recording, open_recording
 from ..core.sensing.recordings.verification import Verification
 from ..core.sensing.scans.sensor import MountedSensor
 from ..core.site.scene_geometry import SceneGeometry
-from ..core.storage.files import check_folder, save_json, whole_file
+from ..core.storage.files import check_folder, whole_file
 from ..core.workflows.survey_settings import SurveySettings
-from ..core.workflows.verification_record import (
-    CHANGES_FILE,
-    UNITS_FILE,
-    record_of,
-    save_changes,
-    save_units,
-    verification_record,
-)
+from ..core.workflows.verification_record import record_of, write_verification
 from ..core.workflows.verifying import verify
 from ..properties.conversion import absolute, output_folder
 from ..scene.changes import watch
@@ -46,15 +38,8 @@ NO_RECORDING = "Name a recording of the installed sensors: a folder of sweeps, o
 NOT_VERIFIED = "Not verified since the file was opened: verify again to add the changes."
 CHANGED = "The scene has changed since: verify again."
 CHANGES = VERIFICATION_PICTURES[0]
-
-
-@dataclass(frozen=True, eq=False)
-class _Verified:
-    """A verification with the sentences of the panel and the content of its files."""
-
-    found: Verification
-    sentences: tuple[str, ...]
-    files: Mapping[str, bytes]
+_Verified = tuple[Verification, Mapping[str, bytes]]
+"""A verification with the content of its files."""
 
 
 def why_no_verification(scene: bpy.types.Scene) -> str:
@@ -117,12 +102,13 @@ class SEIP_OT_verify(Conditional, LongWork[_Verified], bpy.types.Operator):
     def conclude(self, scene: bpy.types.Scene, result: _Verified) -> None:
         """Write the files, keep what was found, and report it."""
         check_folder(self._folder)
-        for name, content in result.files.items():
+        found, files = result
+        for name, content in files.items():
             with whole_file(self._folder / name) as temporary:
                 temporary.write_bytes(content)
-        scene.seip.verification.found = "\n".join(result.sentences)
-        session.of(scene).verification = LastVerification(result.found, self._watch)
-        for sentence in result.found.warnings:
+        scene.seip.verification.found = "\n".join(summary(record_of(scene.name, "", found)))
+        session.of(scene).verification = LastVerification(found, self._watch)
+        for sentence in found.warnings:
             self.report({"WARNING"}, sentence)
         self.report({"INFO"}, f"verified; written to {self._folder}")
 
@@ -138,18 +124,10 @@ def _verified(
         found = yield from verify(
             geometry, sensors, recording, settings.visibility, spacing=settings.grid_spacing, engine=settings.engine
         )
-        drawn = Path(raw)
-        changes, returns = VERIFICATION_PICTURES
-        yield Progress(0, 0, "drawing what differs")
-        save_changes_picture(drawn / changes, geometry, sensors, found)
-        yield Progress(0, 0, "drawing the returns")
-        save_returns_chart(drawn / returns, found)
-        save_changes(drawn / CHANGES_FILE, found)
-        save_units(drawn / UNITS_FILE, recording.name, found)
-        made = {"versions": versions(blender=bpy.app.version_string)}
-        save_json(drawn / VERIFICATION_FILE, verification_record(geometry.name, recording.name, found) | made)
-        sentences = summary(record_of(geometry.name, recording.name, found))
-        return _Verified(found, sentences, {path.name: path.read_bytes() for path in sorted(drawn.iterdir())})
+        yield Progress(0, 0, "drawing the differences")
+        made_with = versions(blender=bpy.app.version_string)
+        write_verification(Path(raw), geometry, sensors, recording.name, found, made_with)
+        return found, {path.name: path.read_bytes() for path in sorted(Path(raw).iterdir())}
 
 
 class SEIP_OT_correct_scene(Conditional, ShortWork, bpy.types.Operator):
@@ -173,6 +151,3 @@ class SEIP_OT_correct_scene(Conditional, ShortWork, bpy.types.Operator):
         for sentence in problems:
             self.report({"WARNING"}, sentence)
         self.report({"INFO"}, "the scene is as recorded; its placement is stale")
-
-
-CLASSES = (SEIP_OT_verify, SEIP_OT_correct_scene)

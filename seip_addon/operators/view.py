@@ -30,7 +30,7 @@ NO_COVERAGE = "There is no coverage to show: place sensors first."
 
 
 def why_no_coverage(scene: bpy.types.Scene) -> str:
-    """Return why coverage cannot be coloured; nothing where it can."""
+    """Return why coverage cannot be coloured, or ""."""
     return NO_COVERAGE if coverage_of(scene) is None else ""
 
 
@@ -45,10 +45,10 @@ class SEIP_OT_colour_coverage(Conditional, bpy.types.Operator):
         name="Show",
         description="Meaning of the road's colours",
         items=(
-            ("returns", "Returns", "Expected returns from a pedestrian there, where sensors were placed for returns"),
-            ("seen", "Seen", "Whether any sensor measures the surface of the road"),
-            ("times", "Sensors", "How many sensors measure the surface of the road"),
-            ("weights", "Weights", "Weight of each part of the road, where regions are weighted"),
+            ("returns", "Returns", "Expected returns from a pedestrian, if sensors were placed for returns"),
+            ("seen", "Seen", "Road surface that some sensor measures"),
+            ("times", "Sensors", "Number of sensors that measure the road surface"),
+            ("weights", "Weights", "Weight of each part of the road, if regions are weighted"),
         ),
         default="times",
     )
@@ -112,7 +112,7 @@ class SEIP_OT_hide_overlay(bpy.types.Operator):
     bl_idname = "seip.hide_overlay"
     bl_label = "Hide"
 
-    name: bpy.props.StringProperty(name="Name", description="Name of what is drawn over the view")
+    name: bpy.props.StringProperty(name="Name", description="Name of the overlay")
 
     def execute(self, context: bpy.types.Context) -> Outcome:
         """Hide it; a point cloud is forgotten, as it would be shown again in other colours."""
@@ -145,7 +145,7 @@ class SEIP_OT_save_picture(ForPlacement, LongWork[SceneState], bpy.types.Operato
         """Take the picture of a viewport."""
         session.of(scene).state = result
         area = getattr(self, "_area", None) or bpy.context.area
-        if bpy.app.background or area not in _viewports():
+        if bpy.app.background or area not in overlays.viewports(bpy.context.window_manager.windows):
             raise SeipError(
                 "there is no viewport here to take a picture of: press this in the sidebar of one, or export the files "
                 "with the rendered view"
@@ -177,12 +177,6 @@ def _save_sheet(path: Path, state: SceneState, view: Any) -> None:  # noqa: ANN4
             save_sheet(path, view, picture)
 
 
-def _viewports() -> list[bpy.types.Area]:
-    """Return the open 3D viewports: one may have been closed since the picture was requested."""
-    areas = (area for window in bpy.context.window_manager.windows for area in window.screen.areas)
-    return [area for area in areas if area.type == "VIEW_3D"]
-
-
 def _named(text: str) -> Path:
     if text.startswith("//") and not bpy.data.filepath:
         raise SeipError(f"the picture {text} is beside the file, and the file has not been saved: save it first")
@@ -196,11 +190,3 @@ def _free(path: Path) -> Path:
     """Return the name, with the first number that is free where there is a picture of that name."""
     numbered = (path.with_stem(f"{path.stem}-{number}") for number in count(2))
     return next(name for name in chain([path], numbered) if not name.exists())
-
-
-CLASSES = (
-    SEIP_OT_colour_coverage,
-    SEIP_OT_show_sight_lines,
-    SEIP_OT_save_picture,
-    SEIP_OT_hide_overlay,
-)

@@ -7,22 +7,17 @@ from pathlib import Path
 import bpy
 
 from ..operators import results
-from .sidebar import draw_path, draw_run
-from .wrapped_text import draw_sentence
+from .sidebar import draw_path, draw_reason, draw_run
 
 
 def draw(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     """Draw the folder and the buttons."""
     scene = context.scene
-    sentence = results.no_placement(scene)
-    if sentence:
-        draw_sentence(layout, sentence, icon="INFO")
+    if draw_reason(layout, results.no_placement(scene)):
         return
     draw_path(layout, scene.seip.result, "folder")
     layout.prop(scene.seip.result, "render")
-    sentence = results.no_folder(scene) or results.not_evaluated(scene)
-    if sentence:
-        draw_sentence(layout, sentence, icon="INFO")
+    draw_reason(layout, results.no_folder(scene) or results.not_evaluated(scene))
     draw_run(layout, "seip.write_report", icon="FILE_TEXT")
     draw_run(layout, "seip.export_result", icon="EXPORT", text="Export Files")
     _draw_files(layout, results.exported_files(scene))

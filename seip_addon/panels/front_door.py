@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import bpy
 
-from ..operators.site import (
-    EXTRACTS,
-)
+from ..operators.site import EXTRACTS
 
 OPENDRIVE = "*.xodr"
 
@@ -84,16 +82,3 @@ def draw_object(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
 
 
 MENUS = (("TOPBAR_MT_file_import", draw_import), ("VIEW3D_MT_add", draw_add), ("VIEW3D_MT_object", draw_object))
-CLASSES = (SEIP_FH_opendrive, SEIP_FH_openstreetmap, SEIP_MT_main)
-
-
-def attach() -> None:
-    """Add to Blender's menus."""
-    for name, draw in MENUS:
-        getattr(bpy.types, name).append(draw)
-
-
-def detach() -> None:
-    """Take that away."""
-    for name, draw in MENUS:
-        getattr(bpy.types, name).remove(draw)

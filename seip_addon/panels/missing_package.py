@@ -21,6 +21,3 @@ class SEIP_PT_incomplete(Sidebar, bpy.types.Panel):
         """Draw the one sentence and the cure."""
         sentence = f"The package {MISSING!r} is missing or broken. Install the extension's zip again: it carries all."
         draw_sentence(self.layout, sentence, icon="ERROR", alert=True)
-
-
-CLASSES = (SEIP_PT_incomplete,)

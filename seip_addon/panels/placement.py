@@ -16,12 +16,13 @@ from ..core.output.results.answer import answer, sentence, status_text
 from ..core.output.results.placement_record import PlacementRecord, parsed_record, relevant_warnings
 from ..core.site.obstruction import NO_OBSTACLES_MESSAGE
 from ..core.workflows.traffic_runs import traffic_folder
+from ..operators.detection import no_python
 from ..operators.results import no_placement
 from ..operators.sensors import SEIP_MT_survey_presets
 from ..scene.sensors import labelled_sensors
 from ..sensor_edits import sensor_edits
 from .sections import BETWEEN, Status, draw_sections
-from .sidebar import RowList, draw_path, draw_run, is_narrow, settings_column
+from .sidebar import RowList, draw_path, draw_reason, draw_run, draw_settings, is_narrow, settings_column
 from .wrapped_text import BOX, draw_lines, draw_sentence, sidebar_width
 
 _SHOWN = {
@@ -74,8 +75,7 @@ def _doubts(scene: bpy.types.Scene) -> list[str]:
 def draw(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     """Draw the goal, the button and the answer, then the closed sections with all other settings."""
     scene = context.scene
-    if scene_status.has_nothing(scene):
-        draw_sentence(layout, scene_status.NO_SITE, icon="INFO")
+    if draw_reason(layout, scene_status.NO_SITE if scene_status.has_nothing(scene) else ""):
         return
     goal = scene.seip.goal
     column = settings_column(layout)
@@ -97,7 +97,8 @@ def draw(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     elif scene_status.has_unevaluated(scene):
         draw_sentence(layout, scene_status.UNEVALUATED, icon="INFO")
         draw_run(layout, "seip.evaluate_sensors")
-    draw_run(layout, "seip.judge_placement")
+    if not no_python(scene):
+        draw_run(layout, "seip.judge_placement")
     draw_sections(
         layout,
         {
@@ -125,9 +126,7 @@ def button_text(scene: bpy.types.Scene) -> str:
 def _draw_objective(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
     """Draw the criterion and the settings of the chosen scenarios."""
     goal = scene.seip.goal
-    column = settings_column(layout)
-    column.prop(goal, "criterion")
-    column.prop(goal, "scenarios")
+    column = draw_settings(layout, goal, "criterion", "scenarios")
     if goal.scenarios == "traffic":
         draw_path(column, goal, "runs", placeholder=traffic_folder(Path(bpy.data.filepath)).name)
     for name in _SHOWN[goal.scenarios]:
@@ -173,23 +172,18 @@ def _draw_candidates(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None
         ("Price", ("installed",)),
     ):
         layout.label(text=heading)
-        group = settings_column(layout)
-        for name in names:
-            group.prop(survey, name)
+        draw_settings(layout, survey, *names)
     if survey.installed:
         draw_path(layout, survey, "installed_cost", placeholder="Shipped")
 
 
 def _draw_search(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
     """Draw the solver and its limit."""
-    survey = scene.seip.survey
-    column = settings_column(layout)
-    column.prop(survey, "solver")
-    column.prop(survey, "effort")
+    draw_settings(layout, scene.seip.survey, "solver", "effort")
 
 
 def _draw_answer(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
-    """Draw the answer in three lines and its details, dimmed while it is not of the scene as it is."""
+    """Draw the answer in three lines and its details, after the reasons why it is not of the scene as it is."""
     record = parsed_record(scene.seip.result.record)
     box = layout.box()
     doubts = _doubts(scene)
@@ -204,22 +198,18 @@ def _draw_answer(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
     if other_goal:
         draw_sentence(box, other_goal, icon="INFO", reserved=BOX)
     column = box.column()
-    column.active = not doubts
+    if doubts:  # dimmed text could not be read in a light theme
+        draw_sentence(column, "Figures of the last placement:", reserved=BOX)
     if scene.seip.result.change:
         draw_sentence(column, scene.seip.result.change, icon="INFO", reserved=BOX)
-    if doubts and record.judgement is not None:
-        draw_sentence(column, "The AP is that of the earlier poses.", icon="INFO", reserved=BOX)
     for text in answer(record):
         draw_sentence(column, text, reserved=BOX)
-    others = {"numbers": partial(_draw_numbers, goal=scene.seip.goal, certain=not doubts)} if numbers(record) else {}
+    others = {"numbers": partial(_draw_numbers, goal=scene.seip.goal)} if numbers(record) else {}
     draw_sections(box, {**others, "details": partial(_draw_details, certain=not doubts)}, record)
 
 
-def _draw_numbers(
-    layout: bpy.types.UILayout, record: PlacementRecord, *, goal: bpy.types.PropertyGroup, certain: bool
-) -> None:
+def _draw_numbers(layout: bpy.types.UILayout, record: PlacementRecord, *, goal: bpy.types.PropertyGroup) -> None:
     """Draw quality and price of the best placement of each number of sensors, with a button that chooses it."""
-    layout.active = certain
     column = layout.column(align=True)
     for count, share, text in numbers(record):
         row = column.split(factor=NUMBER_SHARE, align=True)
@@ -263,7 +253,6 @@ def front_text(record: PlacementRecord) -> str:
 
 def _draw_details(layout: bpy.types.UILayout, record: PlacementRecord, *, certain: bool) -> None:
     """Draw all figures by topic, the certificate while it holds, and the notes."""
-    layout.active = certain
     for topic, lines in figures(record).items():
         if not lines:
             continue
@@ -309,6 +298,3 @@ def figures(record: PlacementRecord) -> dict[str, list[tuple[str, str]]]:
 def _warnings(record: PlacementRecord) -> list[str]:
     """Return the warnings about the site; those about a sensor type are shown with the type."""
     return relevant_warnings(record.warnings, record.request.candidates.sensors, ())
-
-
-CLASSES = (SEIP_UL_rules,)

@@ -60,7 +60,7 @@ class SEIP_AP_preferences(bpy.types.AddonPreferences):
         layout.prop(self, "cores")
         layout.prop(self, "cache")
         row = layout.row()
-        row.label(text=f"Kept visibility: {preferences.kept_visibility().megabytes():,.1f} MB")
+        row.label(text=f"Stored visibility: {preferences.kept_visibility().megabytes():,.1f} MB")
         row.operator("seip.empty_cache", icon="TRASH")
         layout.prop(self, "python")
         layout.prop(self, "sumo")
@@ -72,6 +72,3 @@ class SEIP_AP_preferences(bpy.types.AddonPreferences):
             row.prop(file, "path", text="")
             row.operator("seip.remove_catalogue", text="", icon="X").index = number
         layout.operator("seip.add_catalogue", icon="ADD")
-
-
-CLASSES = (SEIP_PG_catalogue_file, SEIP_AP_preferences)

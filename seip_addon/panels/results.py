@@ -11,9 +11,7 @@ from ..core.output.results.placement_record import PlacementRecord, parsed_recor
 from ..core.sensing.lidar.model import short_name
 from ..operators import results
 from ..operators.results import no_placement
-from ..operators.view import (
-    why_no_coverage,
-)
+from ..operators.view import why_no_coverage
 from ..scene.write import ASPECT, aspects_of, coverage_of
 from ..session import FollowedSensors, session
 from ..viewport import coverage, overlays
@@ -21,7 +19,7 @@ from ..viewport.point_cloud import NAME as CLOUD
 from ..viewport.sight_lines import NAME as SIGHT
 from . import placement
 from .sections import Status, draw_sections
-from .sidebar import RowList, draw_run, is_running
+from .sidebar import RowList, draw_reason, draw_run, is_running
 from .wrapped_text import draw_sentence
 
 ASPECTS: dict[Aspect, str] = {"returns": "Returns", "seen": "Seen", "times": "Sensors", "weights": "Weights"}
@@ -31,8 +29,8 @@ ASPECTS: dict[Aspect, str] = {"returns": "Returns", "seen": "Seen", "times": "Se
 def draw_view(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     """Draw what can be shown."""
     scene = context.scene
-    if why_no_coverage(scene) and no_placement(scene) and session.of(scene).scan is None:
-        draw_sentence(layout, "There is nothing to show yet.", icon="INFO")
+    nothing = why_no_coverage(scene) and no_placement(scene) and session.of(scene).scan is None
+    if draw_reason(layout, "There is nothing to show yet." if nothing else ""):
         return
     _draw_coverage(layout, context)
     _draw_sight(layout, context)
@@ -56,10 +54,7 @@ def _draw_coverage(layout: bpy.types.UILayout, context: bpy.types.Context) -> No
         button.aspect = aspect
     if obj is not None and "returns" in possible and obj.get(ASPECT) in {"seen", "times"}:
         draw_sentence(column, SURFACE_SEEN, icon="INFO")
-    why_not = why_no_coverage(context.scene)
-    if why_not:
-        draw_sentence(column, why_not, icon="INFO")
-    elif not coverage.shows_coverage(context.space_data):
+    if not draw_reason(column, why_no_coverage(context.scene)) and not coverage.shows_coverage(context.space_data):
         text = "This view's shading does not show the colours: press one of them."
         draw_sentence(column, text, icon="ERROR")
 
@@ -75,9 +70,7 @@ def _draw_sight(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
         row.operator("seip.hide_overlay", text="", icon="X").name = SIGHT
     if is_running("seip.show_sight_lines"):
         draw_run(column, "seip.show_sight_lines")
-    why_not = no_placement(context.scene)
-    if why_not:
-        draw_sentence(column, why_not, icon="INFO")
+    draw_reason(column, no_placement(context.scene))
 
 
 def _draw_cloud(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
@@ -129,9 +122,7 @@ def status(scene: bpy.types.Scene) -> Status:
 def draw(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     """Draw the sensors and how they are followed when moved, then the closed sections."""
     scene = context.scene
-    sentence = results.no_placement(scene)
-    if sentence:
-        draw_sentence(layout, sentence, icon="INFO")
+    if draw_reason(layout, no_placement(scene)):
         if coverage_of(scene) is not None:
             draw_sections(layout, {"view": draw_view}, context)
         return
@@ -198,7 +189,7 @@ def _draw_comparison(layout: bpy.types.UILayout, context: bpy.types.Context) -> 
         draw_sentence(layout, str(error), icon="ERROR")
         return
     if shares is None:
-        draw_sentence(layout, results.OTHER_TARGETS, icon="INFO")
+        draw_reason(layout, results.OTHER_TARGETS)
         return
     _draw_shares(layout, shares)
     layout.operator("seip.show_comparison").back = False
@@ -237,6 +228,3 @@ def _returns(record: PlacementRecord) -> str:
 
 def _share(value: float | None) -> str:
     return "–" if value is None else f"{value:.2%}"
-
-
-CLASSES = (SEIP_UL_chosen, SEIP_UL_kept)

@@ -22,8 +22,8 @@ from .sections import Status, draw_sections
 from .sidebar import is_narrow, settings_column
 from .wrapped_text import draw_sentence
 
-TABLE_WIDTH = 760
-"""Width of the table, pixels at the usual scale of the interface."""
+TABLE_WIDTH, TABLE_MARGIN = 760, 40
+"""Width of the table, and of the window beside it, pixels at the usual scale of the interface."""
 COLUMNS = (("Sensor", 0.40), ("Channels", 0.11), ("Field of view", 0.14), ("Pedestrian", 0.12), ("Price", 0.11))
 """Titles and shares of the width; the rest shows what the detection law rests on."""
 
@@ -39,7 +39,8 @@ class SEIP_OT_choose_sensors(bpy.types.Operator):
         """Show the table."""
         sensor_types.refresh()
         context.scene.seip.survey.filter = ""
-        outcome: Outcome = context.window_manager.invoke_popup(self, width=TABLE_WIDTH)
+        room = int(context.window.width / context.preferences.system.ui_scale) - TABLE_MARGIN
+        outcome: Outcome = context.window_manager.invoke_popup(self, width=min(TABLE_WIDTH, room))
         return outcome
 
     def execute(self, _context: bpy.types.Context) -> Outcome:
@@ -258,6 +259,3 @@ def _draw_beams(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     draw_sentence(layout, "Orange: more; road between may go unseen", icon="COLORSET_02_VEC")
     before = " in front" if preview.tilt else ""
     draw_sentence(layout, f"A level road{before} has no gaps up to {preview.resolved_to():.0f} m.")
-
-
-CLASSES = (SEIP_OT_choose_sensors,)

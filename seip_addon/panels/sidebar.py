@@ -81,6 +81,21 @@ class RowList:
         raise NotImplementedError
 
 
+def draw_reason(layout: bpy.types.UILayout, reason: str) -> bool:
+    """Draw the reason why a section has nothing to show, and return whether there is one."""
+    if reason:
+        draw_sentence(layout, reason, icon="INFO")
+    return bool(reason)
+
+
+def draw_settings(layout: bpy.types.UILayout, owner: bpy.types.PropertyGroup, *names: str) -> bpy.types.UILayout:
+    """Draw properties in a column of settings, and return the column."""
+    column = settings_column(layout)
+    for name in names:
+        column.prop(owner, name)
+    return column
+
+
 def settings_column(layout: bpy.types.UILayout) -> bpy.types.UILayout:
     """Return a column of settings: names on the left, values on the right; in a narrow sidebar names within fields."""
     column = layout.column()

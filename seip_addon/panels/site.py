@@ -7,18 +7,12 @@ import bpy
 from .. import preferences, scene_status
 from ..core.site.roles import Role
 from ..operators.base import Outcome
-from ..operators.site import (
-    SEIP_OT_build_site,
-    has_site,
-    in_short,
-    is_of_choice,
-    missing_for_build,
-)
+from ..operators.site import SEIP_OT_build_site, has_site, in_short, is_of_choice, missing_for_build
 from ..properties.site import SEIP_PG_site
 from ..scene import roles
 from . import sumo
 from .sections import Status, draw_sections
-from .sidebar import draw_path, draw_run, is_narrow, settings_column
+from .sidebar import draw_path, draw_reason, draw_run, draw_settings, is_narrow, settings_column
 from .wrapped_text import ICON, MARGIN, draw_lines, draw_sentence, wrapped
 
 TARGETS = "Targets"
@@ -40,7 +34,8 @@ def status(scene: bpy.types.Scene) -> Status:
         return Status(result=("not checked", scene.name))
     targets = (f"{one.value.partition(', ')[0]} points" for one in site.counts if one.name == TARGETS)
     doubt = scene_status.stale_check(scene)
-    return Status(doubt not in {"", scene_status.OLD_CHECK}, (in_short(site.problems), *targets, scene.name))
+    changed = doubt not in {"", scene_status.OLD_CHECK, scene_status.OTHER_SENSORS}
+    return Status(changed, (in_short(site.problems), *targets, scene.name))
 
 
 def draw(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
@@ -144,7 +139,7 @@ def _draw_place(layout: bpy.types.UILayout, site: SEIP_PG_site) -> None:
     shape = size.row()
     shape.enabled = bool(site.junction) or site.is_extract()
     shape.prop(site, "region_shape")
-    size.prop(site, "radius", text="Along Them" if site.follows_approaches() else "Radius")
+    size.prop(site, "radius", text="Along Streets" if site.follows_approaches() else "Radius")
 
 
 def _draw_sources(layout: bpy.types.UILayout, site: SEIP_PG_site) -> None:
@@ -153,23 +148,21 @@ def _draw_sources(layout: bpy.types.UILayout, site: SEIP_PG_site) -> None:
     row.enabled = not site.is_extract()  # which has its own buildings, trees and posts
     draw_path(row, site, "osm")
     draw_path(layout, site, "terrain")
-    row = settings_column(layout)
-    row.enabled = bool(site.terrain)
-    row.prop(site, "terrain_epsg")
+    draw_settings(layout, site, "terrain_epsg").enabled = bool(site.terrain)
 
 
 def _place_text(site: SEIP_PG_site) -> str:
     """Return which place is chosen, or what is wrong with the choice."""
     if site.junction:
-        return "The place: this junction."
+        return "The site is at this junction."
     if site.is_described():
-        return "The description's own place."
+        return "The site is at the place that the description gives."
     if not site.is_extract():
-        return "The middle of the map."
+        return "The site is in the middle of the map."
     if not site.position:
-        return "No place is chosen yet."
+        return "Choose a junction, or enter a position."
     wrong = site.wrong_position(site.position)
-    return f"{wrong}." if wrong else "The place: this position."
+    return f"{wrong}." if wrong else "The site is at this position."
 
 
 def _draw_check(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
@@ -180,7 +173,7 @@ def _draw_check(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
         return
     doubt = scene_status.stale_check(scene)
     if doubt:
-        draw_sentence(layout, doubt, icon="ERROR")
+        draw_sentence(layout, doubt, icon="INFO" if doubt == scene_status.OTHER_SENSORS else "ERROR")
     elif not site.problems:
         draw_sentence(layout, "The site is sound.", icon="CHECKMARK")
     else:
@@ -197,8 +190,7 @@ def _draw_check(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
 
 def _draw_contents(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
     site = scene.seip.site
-    if not site.checked:
-        draw_sentence(layout, "Check the site to count its contents.", icon="INFO")
+    draw_reason(layout, "" if site.checked else "Check the site to count its contents.")
     for one in site.counts:
         draw_sentence(layout, f"{one.name}: {one.value}")
 
@@ -216,9 +208,7 @@ def _draw_roles(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
         for place, text in (("CURSOR", "Draw at Cursor"), ("VIEW", "Draw in View")):
             button = row.operator("seip.add_area", text=text)
             button.role, button.place = site.role, place
-    if context.object is None:
-        draw_sentence(layout, "Select objects to give them a role.", icon="INFO")
-    else:
+    if not draw_reason(layout, "" if context.object else "Select objects to give them a role."):
         _draw_object(layout, context.scene, context.object)
 
 
@@ -232,6 +222,3 @@ def _draw_object(layout: bpy.types.UILayout, scene: bpy.types.Scene, obj: bpy.ty
         column.prop(obj, "seip_region_weight")
     if Role.POLES in assigned:
         column.prop(obj, "seip_pole_rule")
-
-
-CLASSES = (SEIP_OT_choose_place,)

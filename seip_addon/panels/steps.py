@@ -24,6 +24,3 @@ class SEIP_PT_steps(Sidebar, bpy.types.Panel):
         after = {"results": results, "traffic": traffic, "export": export}
         status = {name: part.status(context.scene) for name, part in after.items() if part is not export}
         draw_sections(self.layout, {name: part.draw for name, part in after.items()}, context, status)
-
-
-CLASSES = (SEIP_PT_steps,)

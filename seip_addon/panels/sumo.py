@@ -22,7 +22,7 @@ def draw_missing(layout: bpy.types.UILayout) -> None:
 
 
 def draw_status(layout: bpy.types.UILayout) -> None:
-    """Draw which SUMO there is, or the button that installs it."""
+    """Draw the SUMO in use, or the button that installs it."""
     status, works = preferences.sumo_status()
     draw_sentence(layout, f"{status}.", icon="CHECKMARK" if works else "ERROR")
     if not works:

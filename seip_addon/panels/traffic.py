@@ -13,25 +13,14 @@ from ..core.workflows.detection import ERRORS
 from ..core.workflows.traffic_runs import traffic_folder
 from ..operators.detection import NO_PYTHON, sensors_key, why_no_detection
 from ..operators.simulation import why_no_simulation
-from ..operators.traffic import (
-    why_no_load,
-    why_no_scan,
-)
-from ..operators.verification import (
-    CHANGED as VERIFY_AGAIN,
-)
-from ..operators.verification import (
-    NO_RECORDING,
-    picture_of,
-    sentences_of,
-    why_no_correction,
-    why_no_verification,
-)
+from ..operators.traffic import why_no_load, why_no_scan
+from ..operators.verification import CHANGED as VERIFY_AGAIN
+from ..operators.verification import NO_RECORDING, picture_of, sentences_of, why_no_correction, why_no_verification
 from ..properties.conversion import absolute
 from ..session import session
 from . import sumo
 from .sections import Status, draw_sections
-from .sidebar import draw_path, draw_run, settings_column
+from .sidebar import draw_path, draw_reason, draw_run, draw_settings
 from .wrapped_text import BOX, draw_sentence
 
 USED = "Detection and placements in traffic use these runs."
@@ -49,15 +38,12 @@ def draw_simulation(layout: bpy.types.UILayout, context: bpy.types.Context) -> N
     scene = context.scene
     simulation = scene.seip.simulation
     sumo.draw_missing(layout)
-    column = settings_column(layout)
+    draw_settings(layout, simulation, "flow", "pedestrians", "duration", "count")
     found = simulation.street_map()
-    for name in ("flow", "pedestrians", "duration", "count"):
-        column.prop(simulation, name)
     draw_path(layout, simulation, "map", placeholder="OpenDRIVE (.xodr)" if found is None else Path(found.name).name)
     draw_path(layout, simulation, "folder")
     reason = why_no_simulation(scene)
-    if reason and preferences.sumo() is not None:  # else the sentence is there already
-        draw_sentence(layout, reason, icon="INFO")
+    draw_reason(layout, "" if preferences.sumo() is None else reason)  # without SUMO the sentence is there already
     draw_run(layout, "seip.simulate_traffic")
     if not simulation.facts:
         return
@@ -99,8 +85,7 @@ def draw_detection(layout: bpy.types.UILayout, context: bpy.types.Context) -> No
     scene = context.scene
     detection = scene.seip.detection
     why_not = why_no_detection(scene)
-    if why_not:
-        draw_sentence(layout, why_not, icon="INFO")
+    if draw_reason(layout, why_not):
         if why_not == NO_PYTHON and preferences.own() is not None:
             layout.operator("preferences.addon_show", text="Preferences").module = preferences.ADDON_ID
     else:
@@ -123,8 +108,6 @@ def _draw_found(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
     column = box.column()
     if _detection_status(scene).changed:
         draw_sentence(column, OTHER_SENSORS, icon="ERROR", reserved=BOX)
-        column = box.column()
-        column.active = False
     table = column.column(align=True)
     for name, figure in figures(found):
         row = table.split(factor=0.42)
@@ -156,8 +139,7 @@ def draw_verification(layout: bpy.types.UILayout, context: bpy.types.Context) ->
     scene = context.scene
     draw_path(layout, scene.seip.verification, "recording", "Recording (folder, .pcap)", named=False)
     reason = why_no_verification(scene)
-    if reason and reason != NO_RECORDING:  # an empty field says so itself
-        draw_sentence(layout, reason, icon="INFO")
+    draw_reason(layout, "" if reason == NO_RECORDING else reason)  # an empty field says so itself
     draw_run(layout, "seip.verify")
     sentences = sentences_of(scene)
     if not sentences:
@@ -165,8 +147,7 @@ def draw_verification(layout: bpy.types.UILayout, context: bpy.types.Context) ->
     box = layout.box()
     for sentence in sentences:
         draw_sentence(box, sentence, reserved=BOX)
-    changed = why_no_correction(scene)
-    if changed:
+    if changed := why_no_correction(scene):
         draw_sentence(box, changed, icon="INFO", reserved=BOX)
     row = box.row(align=True)
     row.operator("seip.correct_scene", icon="ADD")
@@ -198,9 +179,7 @@ def draw(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     if files is not None and not files.trajectories:
         draw_path(column, traffic, "routes", "Routes (vehicle types)", named=False)
         draw_path(column, traffic, "net", "Network (.net.xml)", named=False)
-    reason = why_no_load(context.scene)
-    if reason and traffic.file:  # an empty field says so itself
-        draw_sentence(layout, reason, icon="INFO")
+    draw_reason(layout, why_no_load(context.scene) if traffic.file else "")  # an empty field says so itself
     row = layout.row(align=True)
     draw_run(row, "seip.load_traffic")
     row.operator("seip.clear_traffic", text="", icon="TRASH")
@@ -224,14 +203,9 @@ def draw(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
 def _draw_scan(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     """Draw how scans are made, and the last."""
     traffic = context.scene.seip.traffic
-    why_not = why_no_scan(context.scene)
-    if why_not:
-        draw_sentence(layout, why_not, icon="INFO")
+    if draw_reason(layout, why_no_scan(context.scene)):
         return
-    column = settings_column(layout)
-    column.prop(traffic, "noise")
-    column.prop(traffic, "seed")
-    column.prop(traffic, "rolling_shutter")
+    draw_settings(layout, traffic, "noise", "seed", "rolling_shutter")
     draw_run(layout, "seip.scan_frame")
     scan = session.of(context.scene).scan
     for line in scan.facts if scan is not None else ():
@@ -241,18 +215,11 @@ def _draw_scan(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
 def _draw_dataset(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     """Draw what is written where."""
     traffic = context.scene.seip.traffic
-    why_not = why_no_scan(context.scene)
-    if why_not:
-        draw_sentence(layout, why_not, icon="INFO")
+    if draw_reason(layout, why_no_scan(context.scene)):
         return
     draw_path(layout, traffic, "folder")
-    column = settings_column(layout)
-    column.prop(traffic, "whole")
-    if not traffic.whole:
-        column.prop(traffic, "start")
-        column.prop(traffic, "duration")
-    column.prop(traffic, "rate")
-    column.prop(traffic, "split")
+    part = () if traffic.whole else ("start", "duration")
+    draw_settings(layout, traffic, "whole", *part, "rate", "split")
     layout.label(text="Formats")
     layout.column(align=True).prop(traffic, "formats")
     draw_run(layout, "seip.write_dataset")

@@ -141,6 +141,28 @@ class SEIP_PG_goal(bpy.types.PropertyGroup):
             failures="none" if self.scenarios == "traffic" else self.failures,
         )
 
+    def take_over(self, goal: Objective) -> None:
+        """Take over an objective, as far as the panel has its parts."""
+        self.limit = "COUNT" if goal.coverage is None else "COVERAGE"
+        if goal.count is None and goal.budget is not None:
+            self.limit = "BUDGET"
+        self.count, self.budget = goal.count or DEFAULT_COUNT, goal.budget or self.budget
+        self.coverage = self.coverage if goal.coverage is None else 100 * goal.coverage
+        self.weighting = "NONE" if goal.central_weight is None else "VALUE"
+        if goal.central_weight == "scene":
+            self.weighting = "SCENE"
+        elif goal.central_weight is not None:
+            self.central_weight = goal.central_weight
+        self.rules.clear()
+        for rule, names in (("FORBIDDEN", goal.forbidden), ("MANDATORY", goal.mandatory)):
+            for name in names:
+                entry = self.rules.add()
+                entry.name, entry.rule = name, rule
+        errors = goal.scenarios.pose_errors
+        self.scenarios, self.position_error, self.tilt_error = goal.scenarios.kind, errors.position, errors.tilt
+        for name in ("min_distance", "criterion", "risk", "failures"):
+            setattr(self, name, getattr(goal, name))
+
     def _scenarios(self) -> Scenarios:
         if self.scenarios == "traffic":
             return Scenarios("traffic")
@@ -153,6 +175,3 @@ class SEIP_PG_goal(bpy.types.PropertyGroup):
         if self.weighting == "SCENE":
             return "scene"
         return as_typed(self.central_weight) if self.weighting == "VALUE" else None
-
-
-CLASSES = (SEIP_PG_position_rule, SEIP_PG_goal)

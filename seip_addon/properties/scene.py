@@ -6,6 +6,9 @@ import bpy
 from bpy.props import BoolProperty, CollectionProperty, EnumProperty, IntProperty, PointerProperty, StringProperty
 
 from .. import last_scan, selection
+from ..core.errors import SeipError
+from ..core.output.results.placement_record import parsed_record
+from ..scene import contract
 from ..scene_status import FILE_VERSION
 from ..viewport import coverage
 from .conversion import path_property
@@ -21,7 +24,7 @@ class SEIP_PG_chosen(bpy.types.PropertyGroup):
 
 
 class SEIP_PG_placement(bpy.types.PropertyGroup):
-    """A placement: enough to find all about it again from the scene and the visibility kept in the cache."""
+    """Stored placement; the rest is recomputed from the scene and the cached visibility."""
 
     record: StringProperty(name="Record", description="Placement as in placement.json")
     targets: StringProperty(name="Targets", description="Digest of the placement's targets")
@@ -29,7 +32,7 @@ class SEIP_PG_placement(bpy.types.PropertyGroup):
 
 
 class SEIP_PG_result(SEIP_PG_placement):
-    """The placement that stands in the scene, and what is looked at of it."""
+    """Current placement and its display settings."""
 
     change: StringProperty(name="Change", description="Difference from the placement before")
     sensors: CollectionProperty(type=SEIP_PG_chosen)
@@ -46,6 +49,13 @@ class SEIP_PG_result(SEIP_PG_placement):
         description="Add a rendered view of the scene to the files and the report, which takes a minute",
         default=False,
     )
+
+    def keep(self, record: str, targets: str, seen: str) -> None:
+        """Keep a placement as the current one, with a row for each of its sensors."""
+        self.record, self.targets, self.seen = record, targets, seen
+        self.sensors.clear()
+        for sensor in parsed_record(record).sensors:
+            self.sensors.add().name = sensor.id
 
 
 class SEIP_PG_detection(bpy.types.PropertyGroup):
@@ -104,9 +114,9 @@ class SEIP_PG_view(bpy.types.PropertyGroup):
         name="Point Colours",
         description="Meaning of the point cloud's colours",
         items=(
-            ("sensor", "Sensor", "Which sensor measured the point"),
-            ("intensity", "Intensity", "How strong the return is"),
-            ("instance", "Road User", "Which road user returned it"),
+            ("sensor", "Sensor", "Sensor that measured the point"),
+            ("intensity", "Intensity", "Intensity of the return"),
+            ("instance", "Road User", "Road user that the point is on"),
         ),
         update=_recolour,
     )
@@ -133,23 +143,20 @@ class SEIP_PG_scene(bpy.types.PropertyGroup):
     detection: PointerProperty(type=SEIP_PG_detection)
     verification: PointerProperty(type=SEIP_PG_verification)
 
+    def take_over_placement(self) -> None:
+        """Take over the placement that a command has stored in the scene, and its settings, if there is one."""
+        scene = self.id_data
+        stored = scene.get(contract.PLACEMENT)
+        if stored is None:
+            return
+        try:
+            request = parsed_record(stored["record"]).request
+        except SeipError:  # of a newer version: the sensors can still be evaluated
+            return
+        self.result.keep(*(stored[name] for name in ("record", "targets", "seen")))
+        self.survey.take_over(request)
+        self.goal.take_over(request.goal)
+        del scene[contract.PLACEMENT]
 
-def attach() -> None:
-    """Give every scene its properties."""
-    bpy.types.Scene.seip = PointerProperty(type=SEIP_PG_scene)
 
-
-def detach() -> None:
-    """Take them away."""
-    del bpy.types.Scene.seip
-
-
-CLASSES = (
-    SEIP_PG_chosen,
-    SEIP_PG_placement,
-    SEIP_PG_result,
-    SEIP_PG_detection,
-    SEIP_PG_verification,
-    SEIP_PG_view,
-    SEIP_PG_scene,
-)
+PROPERTIES = ((bpy.types.Scene, "seip", PointerProperty(type=SEIP_PG_scene)),)

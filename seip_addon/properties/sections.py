@@ -75,17 +75,7 @@ class SEIP_PG_sections(bpy.types.PropertyGroup):
         self.site_state = self.sensors_state = self.placement_state = AUTOMATIC
 
 
-CLASSES = (SEIP_PG_sections,)
-
-
-def attach() -> None:
-    """Give the window manager its properties."""
-    bpy.types.WindowManager.seip_sections = PointerProperty(type=SEIP_PG_sections)
-
-
-def detach() -> None:
-    """Remove them."""
-    del bpy.types.WindowManager.seip_sections
+PROPERTIES = ((bpy.types.WindowManager, "seip_sections", PointerProperty(type=SEIP_PG_sections)),)
 
 
 def forget() -> None:

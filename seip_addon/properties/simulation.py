@@ -71,6 +71,3 @@ class SEIP_PG_simulation(bpy.types.PropertyGroup):
         return "|".join(
             (self.map, *(f"{value:g}" for value in (self.flow, self.pedestrians, self.duration, self.count)))
         )
-
-
-CLASSES = (SEIP_PG_simulation,)

@@ -1,4 +1,4 @@
-"""Properties of the site: where it comes from, what its check found, and what its objects mean."""
+"""Properties of the site: sources, results of the check, weights and rules of objects."""
 
 from __future__ import annotations
 
@@ -6,13 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import bpy
-from bpy.props import (
-    BoolProperty,
-    CollectionProperty,
-    EnumProperty,
-    FloatProperty,
-    StringProperty,
-)
+from bpy.props import BoolProperty, CollectionProperty, EnumProperty, FloatProperty, StringProperty
 
 from ..core.errors import SeipError
 from ..core.site.scene_geometry import DEFAULT_WEIGHT
@@ -31,21 +25,21 @@ _CODE = {"min": 0, "max": 999_999}
 
 
 class SEIP_PG_junction(bpy.types.PropertyGroup):
-    """A junction of the chosen file; its name is what the list shows."""
+    """A junction of the chosen file, named as in the list."""
 
     id: StringProperty(name="Id", description="Junction id in the map, or latitude and longitude")
 
 
 class SEIP_PG_count(bpy.types.PropertyGroup):
-    """Something that the check counted; its name is what."""
+    """A count of the check; its name is the counted item."""
 
     value: StringProperty(name="Count", description="Count")
 
 
 class SEIP_PG_problem(bpy.types.PropertyGroup):
-    """Something that the check found; its name is the object to look at, or empty."""
+    """A problem of the site; its name is that of the object concerned, or empty."""
 
-    is_error: BoolProperty(name="Error", description="Whether the problem prevents a survey")
+    is_error: BoolProperty(name="Error", description="Problem that prevents a placement")
     text: StringProperty(name="Problem", description="Problem and its cure")
 
 
@@ -53,7 +47,7 @@ ROLE_ITEMS = tuple((role.name, role.value.capitalize(), f"{roles.WORDS[role].cap
 
 
 class SEIP_PG_site(bpy.types.PropertyGroup):
-    """Sources of the site, and the findings of the check."""
+    """Sources of the site, and the results of its check."""
 
     source: path_property("Map", "OpenDRIVE map, site description that names one, or extract of OpenStreetMap")
     new_site: StringProperty(
@@ -93,12 +87,12 @@ class SEIP_PG_site(bpy.types.PropertyGroup):
     terrain: of_setting(TerrainRequest, "path", "Terrain", **_FILE)
     terrain_epsg: of_setting(TerrainRequest, "epsg", "EPSG", default=0, **_CODE)
     role: EnumProperty(name="Role", description="Role of objects in the placement", items=ROLE_ITEMS)
-    checked: BoolProperty(name="Checked", description="Whether the scene was checked")
+    checked: BoolProperty(name="Checked", description="Result of a check is available")
     counts: CollectionProperty(type=SEIP_PG_count)
     problems: CollectionProperty(type=SEIP_PG_problem)
 
     def is_described(self) -> bool:
-        """Return whether a site description says where the place is, and how large."""
+        """Return whether a site description gives the place and its size."""
         return self.source.lower().endswith(DESCRIPTION_SUFFIX) and not self.junction
 
     def is_extract(self) -> bool:
@@ -177,35 +171,35 @@ def _set_pole_rule(obj: bpy.types.Object, value: int) -> None:
             del obj[mark]
 
 
-CLASSES = (SEIP_PG_junction, SEIP_PG_count, SEIP_PG_problem, SEIP_PG_site)
-
-
-def attach() -> None:
-    """Give objects the properties that stand for the contract's custom properties."""
-    bpy.types.Object.seip_region_weight = FloatProperty(
-        name="Weight",
-        description=f"How much each target in this region counts, where others count 1 ({contract.WEIGHT})",
-        get=_region_weight,
-        set=_set_region_weight,
-        min=0.001,
-        soft_max=10.0,
-        options=set(),
-    )
-    bpy.types.Object.seip_pole_rule = EnumProperty(
-        name="Rule",
-        description=f"What the placement does with this pole ({contract.FORBIDDEN}, {contract.MANDATORY})",
-        items=(
-            ("FREE", "Free", "It may carry a sensor"),
-            ("MANDATORY", "Sensor", "It must carry one"),
-            ("FORBIDDEN", "No Sensor", "It must carry none"),
+PROPERTIES = (
+    (
+        bpy.types.Object,
+        "seip_region_weight",
+        FloatProperty(
+            name="Weight",
+            description=f"Weight of each target in this region; other targets have 1 ({contract.WEIGHT})",
+            get=_region_weight,
+            set=_set_region_weight,
+            min=0.001,
+            soft_max=10.0,
+            options=set(),
         ),
-        get=_pole_rule,
-        set=_set_pole_rule,
-        options=set(),
-    )
-
-
-def detach() -> None:
-    """Take them away."""
-    del bpy.types.Object.seip_pole_rule
-    del bpy.types.Object.seip_region_weight
+    ),
+    (
+        bpy.types.Object,
+        "seip_pole_rule",
+        EnumProperty(
+            name="Rule",
+            description=f"Rule for a sensor on this pole ({contract.FORBIDDEN}, {contract.MANDATORY})",
+            items=(
+                ("FREE", "Free", "A sensor is allowed"),
+                ("MANDATORY", "Sensor", "A sensor is required"),
+                ("FORBIDDEN", "No Sensor", "No sensor is allowed"),
+            ),
+            get=_pole_rule,
+            set=_set_pole_rule,
+            options=set(),
+        ),
+    ),
+)
+"""Properties of objects that edit custom properties of the contract."""

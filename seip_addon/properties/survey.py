@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 
 import bpy
 from bpy.props import BoolProperty, CollectionProperty, EnumProperty, FloatProperty, StringProperty
 
 from ..core.choosing.placement.search_limits import DEFAULT_EFFORT
 from ..core.errors import SeipError
+from ..core.output.results.placement_record import RecordedSettings
 from ..core.sensing.visibility.settings import VisibilitySettings
 from ..core.sensing.weather import Weather
 from ..core.site.candidates import DEFAULT_TYPE, MAX_SENSOR_HEIGHT, CandidateSettings, heights_of, tilts_of
@@ -20,7 +21,11 @@ from ..preferences import catalogue_files
 from .conversion import absolute, as_typed, of_setting
 
 _CANDIDATES = CandidateSettings()
-_TILTS = " ".join(f"{math.degrees(tilt):g}" for tilt in _CANDIDATES.tilts)
+
+
+def _listed(numbers: Iterable[float]) -> str:
+    """Return numbers as a user would type them."""
+    return " ".join(f"{number:.7g}" for number in numbers)
 
 
 class SEIP_PG_sensor_type(bpy.types.PropertyGroup):
@@ -52,13 +57,13 @@ class SEIP_PG_survey(bpy.types.PropertyGroup):
     heights: StringProperty(
         name="Heights (m)",
         description="Mounting heights above the ground in metres, like 3.5 5.4 8, or a range FROM:TO:STEP",
-        default=" ".join(f"{height:g}" for height in _CANDIDATES.heights),
+        default=_listed(_CANDIDATES.heights),
     )
     tilts: StringProperty(
         name="Tilts (°)",
         description="Tilts of the sensors down towards the region, in degrees, like 0 5 10, or a range "
         "FROM:TO:STEP; 0 is upright, a negative tilt points up",
-        default=_TILTS,
+        default=_listed(map(math.degrees, _CANDIDATES.tilts)),
     )
     grid: of_setting(SurveySettings, "grid_spacing", "Point Spacing", min=0.05, soft_max=10.0, step=10)
     delta: of_setting(VisibilitySettings, "delta", "Ray Within (δ)", min=0.01, soft_max=5.0, step=10)
@@ -157,6 +162,24 @@ class SEIP_PG_survey(bpy.types.PropertyGroup):
             effort=as_typed(self.effort),
         )
 
+    def take_over(self, request: RecordedSettings) -> None:
+        """Take over the settings of a placement, as far as the panel has them."""
+        candidates, weather = request.candidates, request.weather
+        for key in candidates.sensors:
+            if key not in self.types:
+                self.types.add().name = key
+        for one in self.types:
+            one.use = one.name in candidates.sensors
+        self.heights = _listed(candidates.heights)
+        self.tilts = _listed(map(math.degrees, candidates.tilts))
+        self.spacing, self.allow = candidates.spacing, set(candidates.allow)
+        self.grid, self.delta = request.grid_spacing_m, request.visibility.delta
+        self.rain, self.wet_road = weather.rain, weather.wet_road
+        self.fog = math.isfinite(weather.visibility)
+        if self.fog:
+            self.visibility = weather.visibility
+        self.installed, self.solver, self.effort = request.installed_cost is not None, request.solver, request.effort
+
     def _installed_cost(self) -> InstalledCost | None:
         if not self.installed:
             return None
@@ -169,6 +192,3 @@ def _complaint(read: Callable[[], object]) -> str:
     except SeipError as error:
         return str(error)
     return ""
-
-
-CLASSES = (SEIP_PG_sensor_type, SEIP_PG_survey)

@@ -99,6 +99,3 @@ class SEIP_PG_traffic(bpy.types.PropertyGroup):
             formats=tuple(key for key in FORMATS if key in self.formats),
             split=self.split,
         )
-
-
-CLASSES = (SEIP_PG_traffic,)

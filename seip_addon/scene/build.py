@@ -53,7 +53,7 @@ def remove_site(scene: bpy.types.Scene) -> None:
 
 
 def build_scene(scene: bpy.types.Scene, model: SiteModel, map_name: str) -> Generator[Progress, None, None]:
-    """Fill a scene with a site, after the scene contract of docs/architecture.md.
+    """Fill a scene with a site, after the scene contract of docs/scene-contract.md.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Names of collections and custom properties in the scene contract, which docs/architecture.md describes.
+"""Names of collections and custom properties in the scene contract, which docs/scene-contract.md describes.
 
 `tests/scene/test_read.py` shows its use.
 """
@@ -51,6 +51,8 @@ ASSUMPTIONS = "seip_assumptions"
 CATEGORY = "seip_category"
 PAINT = "seip_paint"
 SHAPE = "seip_shape"
+PLACEMENT = "seip_placement"
+"""On a scene: the placement that a command has written, which the panel takes over; see `result_folder`."""
 BUILT = "seip_built"
 """Mark of every object that was built from a map; on a scene, the place on that map."""
 WRITTEN = "seip_result"

@@ -28,7 +28,7 @@ from .daylight import add_daylight
 from .interrupts import held_signals
 
 WIDTH, HEIGHT = 1440, 810  # pixels
-SAMPLES, DENOISED_SAMPLES = 12, 2  # without and with a denoiser, for as little noise or less
+SAMPLES, DENOISED_SAMPLES = 12, 1  # without and with a denoiser, for as little noise or less
 AZIMUTHS, ELEVATION = np.radians(-115.0 + 45.0 * np.arange(8)), math.radians(60.0)
 """Directions of the camera, seen from the region."""
 MOST_POINTS = 400  # places on the road at which the view is checked for obstacles
@@ -276,7 +276,7 @@ def _set_up(stage: bpy.types.Scene) -> None:
     stage.cycles.seed = 0
     stage.cycles.use_adaptive_sampling = False
     stage.cycles.use_denoising = has_denoiser()
-    # at the highest quality, denoising takes five times as long as two samples: the picture hardly differs
+    # at the highest quality, denoising takes ten times as long as a sample: the picture hardly differs
     stage.cycles.denoising_quality = stage.cycles.denoising_prefilter = "FAST"
     stage.cycles.max_bounces = 2
 

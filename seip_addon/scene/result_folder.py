@@ -13,7 +13,7 @@ from ..core.choosing.placement.deployment import Deployment
 from ..core.choosing.placement.objective import Solution, placement_constraints
 from ..core.errors import SeipError
 from ..core.output.pictures.close_ups import save_close_ups
-from ..core.output.pictures.colours import Legend
+from ..core.output.pictures.colours import Legend, packed_counts
 from ..core.output.pictures.labelled_view import save_labelled_view
 from ..core.output.pictures.plan_view import save_plan_view
 from ..core.output.results.candidate_table import save_candidate_table
@@ -23,8 +23,10 @@ from ..core.output.results.geographic_files import LOCATED_FILES, located, save_
 from ..core.output.results.placement_record import PlacementRecord, save_placement
 from ..core.output.results.site_file import save_site_file
 from ..core.progress import Progress
-from ..core.storage.files import unfinished_name
+from ..core.site.site import Site
+from ..core.storage.files import digest, unfinished_name
 from ..core.workflows.survey import Survey
+from . import contract
 from .blend_file import save_blend
 from .gltf import save_glb
 from .pieces import tidy_pieces
@@ -102,7 +104,7 @@ def write_result_folder(
     with result_files(folder) as part:
         tidy_pieces(scene)
         write_result(scene, site, deployment)
-        save_blend(part["placed.blend"])
+        _save_placed(part["placed.blend"], scene, site, deployment, record)
         with TemporaryDirectory(prefix="seip-") as raw:
             pictures = render_elsewhere(Path(raw), part["placed.blend"], scene.name, site, deployment)
             with closing(pictures):
@@ -112,6 +114,16 @@ def write_result_folder(
                 yield from write_tables(part, survey, solution, record)
                 rendered = (yield from pictures) if render else None
             write_pictures(part, survey, record, deployment, rendered, shown_legend(scene))
+
+
+def _save_placed(
+    path: Path, scene: bpy.types.Scene, site: Site, deployment: Deployment, record: PlacementRecord
+) -> None:
+    """Save the scene with its placement as a custom property: only the add-on has properties of its own."""
+    seen = packed_counts(deployment.seen_by)
+    scene[contract.PLACEMENT] = {"record": record.text(), "targets": digest(site.targets.xyz), "seen": seen}
+    save_blend(path)
+    del scene[contract.PLACEMENT]
 
 
 def write_tables(

@@ -19,17 +19,17 @@ ROLES = {role: collection for role, collection in COLLECTIONS.items() if collect
 """The collection of each role that a user may assign."""
 
 WORDS = {
-    Role.REGION: "where targets are laid: its outline in plan is the region of interest",
-    Role.ROADS: "the carriageway: targets lie on it, and rays end on it",
-    Role.GROUND: "other surfaces that rays end on: pavements, verges, terrain",
-    Role.OCCLUDERS: "what stands in the way: buildings, trees, walls",
-    Role.POLES: "posts that can carry a sensor: the origin is the foot, unless faces reach below it",
-    Role.CANDIDATE_AREAS: "where new posts may stand, in plan; usually the pavements",
-    Role.WEIGHTED_REGIONS: "targets in its outline in plan count more",
-    Role.FORBIDDEN_AREAS: "no sensor within its outline in plan",
-    Role.MANDATORY_AREAS: "at least one sensor within its outline in plan",
+    Role.REGION: "region to be covered, by its outline in plan",
+    Role.ROADS: "carriageway, on which the targets are",
+    Role.GROUND: "other surfaces: pavements, verges, terrain",
+    Role.OCCLUDERS: "objects that block the view: buildings, trees, walls",
+    Role.POLES: "posts that can carry a sensor; the origin is the foot, unless faces reach below it",
+    Role.CANDIDATE_AREAS: "areas for new posts, usually the pavements",
+    Role.WEIGHTED_REGIONS: "areas whose targets count more, by their outline in plan",
+    Role.FORBIDDEN_AREAS: "areas without sensors, by their outline in plan",
+    Role.MANDATORY_AREAS: "areas with at least one sensor, by their outline in plan",
 }
-"""What each role means."""
+"""Description of each role."""
 AREAS = tuple(role for role in ROLES if ROLES[role] in contract.AREAS)
 """Roles whose objects mean an area in plan."""
 

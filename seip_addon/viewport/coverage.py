@@ -32,8 +32,8 @@ def update(scene: bpy.types.Scene) -> None:
 def show_colours(scene: bpy.types.Scene) -> None:
     """Show a scene's coverage with its legend, in all views of Solid shading."""
     scene.seip.view.legend = True
-    areas = (area for one in bpy.context.window_manager.windows if one.scene == scene for area in one.screen.areas)
-    for view in (area.spaces.active for area in areas if area.type == "VIEW_3D"):
+    windows = (window for window in bpy.context.window_manager.windows if window.scene == scene)
+    for view in (area.spaces.active for area in overlays.viewports(windows)):
         if view.shading.type == "SOLID" and not shows_coverage(view):
             set_shading(view)
 
@@ -77,14 +77,5 @@ def _after_load(*_: object) -> None:
         update(scene)
 
 
-def attach() -> None:
-    """Show legends whenever a file is opened, and now as soon as Blender lets look at the file."""
-    bpy.app.handlers.load_post.append(_after_load)
-    bpy.app.timers.register(_after_load, first_interval=0.0)
-
-
-def detach() -> None:
-    """Show none any longer."""
-    bpy.app.handlers.load_post.remove(_after_load)
-    if bpy.app.timers.is_registered(_after_load):
-        bpy.app.timers.unregister(_after_load)
+HANDLERS = (("load_post", _after_load),)
+AT_START = (_after_load,)

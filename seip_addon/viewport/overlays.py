@@ -1,9 +1,9 @@
 """Overlays of each scene: shown, hidden and found by name, and drawn in the scene's viewports.
 
-Blender's draw handlers are registered only while there is an overlay.
+Blender's draw handlers are registered only while there is an overlay. `tests/addon/test_view.py` shows its use.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from typing import Any
 
@@ -57,32 +57,33 @@ def draw_overlays(scene: bpy.types.Scene) -> None:
     gpu.state.depth_test_set("NONE")
 
 
+def viewports(windows: Iterable[bpy.types.Window]) -> list[bpy.types.Area]:
+    """Return the 3D viewports of windows."""
+    areas = (area for window in windows for area in window.screen.areas)
+    return [area for area in areas if area.type == "VIEW_3D"]
+
+
 def redraw() -> None:
     """Redraw all viewports with their sidebars."""
-    for window in bpy.context.window_manager.windows:
-        for area in window.screen.areas:
-            if area.type == "VIEW_3D":
-                area.tag_redraw()
+    for area in viewports(bpy.context.window_manager.windows):
+        area.tag_redraw()
 
 
 def open_sidebar(window: bpy.types.Window) -> None:
     """Open the sidebar of a window's 3D views, with this add-on's tab in front."""
-    for area in window.screen.areas:
-        if area.type == "VIEW_3D":
-            area.spaces.active.show_region_ui = True
+    for area in viewports([window]):
+        area.spaces.active.show_region_ui = True
     if not bpy.app.background and not bpy.app.timers.is_registered(_bring_forward):
         bpy.app.timers.register(_bring_forward, first_interval=DRAWN)
 
 
 def _bring_forward() -> None:
     """Put the tab in front: it is there once the sidebar has been drawn."""
-    for window in bpy.context.window_manager.windows:
-        for area in window.screen.areas:
-            for region in area.regions:
-                if area.type == "VIEW_3D" and region.type == "UI" and region.width > 1:
-                    with suppress(TypeError):  # the tab has not been drawn
-                        region.active_panel_category = TAB
-                        region.tag_redraw()
+    for region in (region for area in viewports(bpy.context.window_manager.windows) for region in area.regions):
+        if region.type == "UI" and region.width > 1:
+            with suppress(TypeError):  # the tab has not been drawn
+                region.active_panel_category = TAB
+                region.tag_redraw()
 
 
 def _update_handlers() -> None:

@@ -12,11 +12,13 @@ import numpy as np
 import pytest
 
 from seip_addon import live_coverage, scene_status
-from seip_addon.core.choosing.placement.objective import MOVED, MOVED_MESSAGE
+from seip_addon.core.choosing.placement.objective import MOVED, MOVED_MESSAGE, Objective
 from seip_addon.core.output.pictures.colours import unpacked_counts
+from seip_addon.core.output.results.answer import status_text
 from seip_addon.core.output.results.placement_record import comparable, load_placement, parsed_record
 from seip_addon.panels import placement, results, sensors
 from seip_addon.scene import result_folder
+from seip_addon.scene.blend_file import save_blend
 from seip_addon.scene.result_folder import FILES
 from seip_addon.scene.sensors import placed_sensors
 from seip_addon.sensor_edits import sensor_edits
@@ -58,11 +60,45 @@ def full_scan(scene: bpy.types.Scene) -> np.ndarray:
     return seen
 
 
-def test_a_file_of_a_command_opens_with_its_sensors_which_are_evaluated_there(
+OPTIONS = ["--heights", "8", "--grid", "4", "--spacing", "12", "--count", "2", "--sensor", "type1", "--no-render"]
+
+
+def test_a_file_of_a_command_opens_with_its_placement_and_settings(add_on, small_scene, tmp_path):
+    more = [
+        "--min-distance",
+        "10",
+        "--weather",
+        "rain=2.5",
+        "visibility=300",
+        "--weighted",
+        "3",
+        "--require",
+        "signal pole 1",
+    ]
+    place.main([str(small_scene), *OPTIONS, *more, "-o", str(tmp_path)])
+    written = load_placement(tmp_path / "placement.json")
+    for _ in range(2):  # as written, and saved by the add-on
+        bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "placed.blend"))
+        scene = bpy.context.scene
+        assert parsed_record(scene.seip.result.record) == written
+        assert scene.seip.goal.objective() == written.request.goal
+        assert [one.name for one in scene.seip.result.sensors] == ["S1", "S2"]
+        assert bpy.ops.seip.compare_scene() == {"FINISHED"}
+        assert scene_status.stale_placement(scene) == ""
+        assert not sensor_edits(scene)
+        assert placement.status(scene).result[0] == status_text(written).split(" · ")[0]
+        assert sensors.status(scene) == (False, ("2 × Type 1 (16 channels)", "at 8 m"))
+        bpy.ops.wm.save_mainfile()
+    place.main([str(tmp_path / "placed.blend"), *OPTIONS, "-o", str(tmp_path / "again")])
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "again" / "placed.blend"))
+    assert parsed_record(bpy.context.scene.seip.result.record).request.goal == Objective(count=2)
+
+
+def test_a_file_of_an_earlier_command_opens_with_its_sensors_which_are_evaluated_there(
     add_on, small_scene, tmp_path, monkeypatch
 ):
-    options = ["--heights", "8", "--grid", "4", "--spacing", "12", "--count", "2", "--sensor", "type1", "--no-render"]
-    place.main([str(small_scene), *options, "-o", str(tmp_path)])
+    monkeypatch.setattr(result_folder, "_save_placed", lambda path, *_: save_blend(path))
+    place.main([str(small_scene), *OPTIONS, "-o", str(tmp_path)])
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "placed.blend"))
     scene = bpy.context.scene
     assert placement.status(scene).result == ("2 sensors", "not evaluated")

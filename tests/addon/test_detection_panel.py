@@ -75,6 +75,7 @@ def drawn(monkeypatch):
     said, layout = [], MagicMock()
     labels = layout.box().column().column().split().label
     monkeypatch.setattr(traffic_panel, "draw_sentence", lambda _, text, **__: said.append(text))
+    monkeypatch.setattr(traffic_panel, "draw_reason", lambda _, text: bool(text) and not said.append(text))
     traffic_panel.draw_detection(layout, bpy.context)
     return said, [call.kwargs["text"] for call in labels.call_args_list]
 

@@ -13,7 +13,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from seip_addon import loose_pieces, scene_status
 from seip_addon.operators.base import LongWork
-from seip_addon.panels import export, front_door, results, sections, traffic, wrapped_text
+from seip_addon.panels import export, front_door, results, sections, sidebar, traffic, wrapped_text
 from seip_addon.scene import contract
 from seip_addon.scene.read import read_scene
 from seip_addon.scene.sensors import placed_sensors
@@ -137,15 +137,10 @@ def test_the_post_of_a_deleted_sensor_goes_with_it(scene, copied):
 
 
 def test_a_section_has_one_sentence_where_there_is_nothing_yet(scene, monkeypatch):
-    parts = (
-        (results, results.draw),
-        (export, export.draw),
-        (results, results.draw_view),
-        (traffic, traffic.draw_detection),
-    )
-    for part, draw in parts:
+    for draw in (results.draw, export.draw, results.draw_view, traffic.draw_detection):
         said = []
-        monkeypatch.setattr(part, "draw_sentence", lambda _, text, said=said, **__: said.append(text))
+        for module in (sidebar, results, traffic):
+            monkeypatch.setattr(module, "draw_sentence", lambda _, text, said=said, **__: said.append(text))
         layout = DrawnLayout()
         draw(layout, bpy.context)
         assert len(said) == 1

@@ -6,6 +6,7 @@ import bpy
 import pytest
 
 from seip_addon import live_coverage, scene_status, scene_survey
+from seip_addon.panels import site
 from seip_addon.session import SceneState, session
 
 
@@ -169,7 +170,11 @@ def test_a_check_holds_until_scene_or_settings_change(known, tmp_path):
     scene.seip.survey.effort = 30.0  # nothing that a check looks at
     assert scene_status.stale_check(scene) == ""
     scene.seip.survey.heights = "5 8"
+    assert scene_status.stale_check(scene) == scene_status.OTHER_SENSORS
+    assert not site.status(scene).changed
+    scene.seip.survey.spacing = 7.0
     assert scene_status.stale_check(scene) == "The settings have changed since the check."
+    assert site.status(scene).changed
     bpy.ops.seip.check_site()
     move()
     bpy.context.view_layer.update()

@@ -95,7 +95,7 @@ def endless():
 def test_work_under_way_ends_with_the_add_on(add_on):
     running = session.running = RunningWork("seip.check_site", Background(endless()))
     running.timer = bpy.context.window_manager.event_timer_add(1.0, window=bpy.context.window)
-    base.detach()
+    base.forget()
     assert session.running is None
     assert running.timer is None
     assert running.work.join(5.0)

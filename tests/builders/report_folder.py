@@ -60,7 +60,7 @@ def make_folder(
         geometry=replace(
             example.geometry,
             places=(
-                NamedArea("Mill Lane <i>", shapely.box(-55, -7, -7, 7)),
+                NamedArea("Mill Lane \u202e<i>", shapely.box(-55, -7, -7, 7)),
                 NamedArea("High Street", shapely.box(7, -7, 55, 7)),
                 NamedArea(CROSSING.name, shapely.box(9, -7, 13, 7), crossing=True),
             ),

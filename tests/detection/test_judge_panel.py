@@ -41,11 +41,11 @@ def test_panel_and_command_choose_alike(coarse, small_scene, tmp_path, monkeypat
     assert panel.judgement is not None
     said = _drawn(monkeypatch, coarse)
     assert set(panel.judgement.sentences()) <= set(said)
-    assert "The AP is that of the earlier poses." not in said
+    assert "Figures of the last placement:" not in said
     sensor = next(one for one in bpy.data.collections["SEIP Sensors"].objects if "seip_sensor" in one)
     sensor.location.x += 1.0
     bpy.context.view_layer.update()
-    assert "The AP is that of the earlier poses." in _drawn(monkeypatch, coarse)
+    assert "Figures of the last placement:" in _drawn(monkeypatch, coarse)
     place.main([str(small_scene), *COARSE, "--finalists", "3", "-o", str(tmp_path / "command")])
     command = load_placement(tmp_path / "command" / "placement.json")
     assert panel.judgement == command.judgement

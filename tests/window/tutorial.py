@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import csv
 import json
+import re
 import shutil
 import sys
 import time
@@ -20,13 +21,15 @@ sys.path.insert(0, str(Path(__file__).resolve().parent))
 
 import bpy
 from bl_ext.user_default.seip.seip_addon import preferences, scene_status
-from bl_ext.user_default.seip.seip_addon.panels import placement, results
+from bl_ext.user_default.seip.seip_addon.panels import placement, results, sidebar
 from bl_ext.user_default.seip.seip_addon.session import SceneState, session
 from driver import Steps, Window, play
 from mathutils import Vector
 
 SAID: list[str] = []
 """Sentences that the sidebar has drawn."""
+FIRST_ANSWER = re.compile(r"[A-Z][a-z ]+: [\d.]+ returns")
+"""Start of the line below the bar of a search: phase and best value so far."""
 
 
 def _heard(sentence: Callable[..., None]) -> Callable[..., None]:
@@ -37,7 +40,7 @@ def _heard(sentence: Callable[..., None]) -> Callable[..., None]:
     return draw_and_note
 
 
-for module in (placement, results):
+for module in (placement, results, sidebar):
     module.draw_sentence = _heard(module.draw_sentence)
 
 OUT = Path(sys.argv[sys.argv.index("--") + 1]).resolve()
@@ -135,8 +138,10 @@ def _place(window: Window) -> Steps:
     yield 0.5  # until the sidebar is drawn again, with the button back in its place
     assert not _scene().seip.result.record
     assert _known() is None or _known().survey is None, "the run that was stopped went on"
+    SAID.clear()
     yield from window.press("LEFTMOUSE", button)
     yield from window.until(lambda: _scene().seip.result.record, 300)
+    assert any(FIRST_ANSWER.match(sentence) for sentence in SAID), "no answer was shown before the search ended"
     assert len(_sensors()) == 2, _sensors()
     (OUT / "placement.json").write_text(_scene().seip.result.record, encoding="utf-8")
     yield from window.picture("5-placement")

@@ -92,7 +92,7 @@ def _study(options: argparse.Namespace, settings: CriteriaStudySettings) -> Mapp
     detector = Detector.load(SHIPPED_DETECTOR)
     key = digest(
         *(
-            source_digest(study_type.__module__),
+            source_digest("headless.detection", "headless.studies.criteria"),
             surveyed.grid.key,
             detector.key,
             json.dumps(settings_record, default=str),

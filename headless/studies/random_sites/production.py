@@ -91,7 +91,7 @@ def make_site(folder: Path, settings: SiteSettings, number: int) -> Generator[Pr
     """
     find_sumo()
     record = folder / "site.json"
-    key = digest(repr(settings), number, bpy.app.version_string, source_digest(__name__))
+    key = digest(repr(settings), number, bpy.app.version_string, source_digest("headless.studies.random_sites"))
     runs = [run_path(folder, run) for run in range(1, settings.runs + 1)]
     files = [folder / "site.blend", folder / "site.net.xml", *runs]
     if _key_of(record) == key and all(file.is_file() for file in files):

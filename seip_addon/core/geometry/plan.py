@@ -60,12 +60,20 @@ def closed(area: BaseGeometry, gap: float, join: Literal["mitre", "round"] = "mi
     outline, they fill more than the gap; round joins do not.
     """
     wider = _without_twins(area).buffer(gap, join_style=join)  # morphological closing
-    return _without_twins(wider).buffer(-gap, join_style=join)
+    return _narrower(_without_twins(wider), gap, join)
 
 
 def opened(area: BaseGeometry, width: float) -> BaseGeometry:
     """Return an area in plan without parts narrower than ``width`` metres; corners of more than 23 degrees stay."""
-    return area.buffer(-width / 2, join_style="mitre").buffer(width / 2, join_style="mitre")  # morphological opening
+    return _narrower(area, width / 2, "mitre").buffer(width / 2, join_style="mitre")  # morphological opening
+
+
+def _narrower(area: BaseGeometry, by: float, join: Literal["mitre", "round"]) -> BaseGeometry:
+    """Return an area in plan without a strip of a width in metres along its outline."""
+    narrower = area.buffer(-by, join_style=join)
+    # GEOS may lose all of an area where an edge is a few micrometres long: corners are then rounded before
+    lost = narrower.area < area.area - 2 * by * area.length
+    return shapely.set_precision(area, _OVERLAY_GRID).buffer(-by, join_style=join) if lost else narrower
 
 
 def _without_twins(area: BaseGeometry) -> BaseGeometry:

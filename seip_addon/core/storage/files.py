@@ -255,7 +255,10 @@ def parse_json(text: str | bytes) -> Any:  # noqa: ANN401  # any JSON
     def refuse(name: str) -> NoReturn:
         raise ValueError(f"it has the number {name}")
 
-    return json.loads(text, parse_constant=refuse)
+    try:
+        return json.loads(text, parse_constant=refuse)
+    except UnicodeDecodeError as error:
+        raise ValueError("it is not in UTF-8") from error
 
 
 def content_fault(error: Exception) -> str:

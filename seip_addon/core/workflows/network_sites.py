@@ -145,7 +145,7 @@ def table_places(path: Path, approaches: float) -> tuple[NetworkPlace, ...]:
     places = []
     for line, row in rows:
         numbers = {name: _number(path, line, name, row, limits) for name, limits in _NUMBER_COLUMNS.items()}
-        source = path.parent / row["source"]
+        source = path.parent / row.get("source", "")  # a row may end before the column
         try:
             there = source.is_file()
         except OSError:  # a name longer than the system allows

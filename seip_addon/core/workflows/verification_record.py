@@ -1,27 +1,54 @@
-"""Record of a verification, the table of its changes, and the catalogue of its units."""
+"""Files of a verification: pictures, record, table of changes, and catalogue of units."""
 
 from __future__ import annotations
 
 import math
 import re
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from ..distinct_names import distinct_names
-from ..output.results.verification_record import (
-    SCHEMA,
-    RecordedChange,
-    VerificationRecord,
-)
+from ..output.pictures.verification import save_changes_picture, save_returns_chart
+from ..output.results.file_names import VERIFICATION_FILE, VERIFICATION_PICTURES
+from ..output.results.verification_record import SCHEMA, RecordedChange, VerificationRecord
 from ..sensing.recordings.verification import Verification
+from ..sensing.scans.sensor import MountedSensor
+from ..site.scene_geometry import SceneGeometry
 from ..storage.csv_table import save_csv
-from ..storage.files import whole_file
+from ..storage.files import save_json, whole_file
 from ..storage.json_dataclass import as_json
 
 UNITS_FILE = "units.toml"
 """Catalogue of the units of an installation."""
 CHANGES_FILE = "changes.csv"
 """Table of what differs from the scene."""
+
+
+def write_verification(
+    folder: Path,
+    geometry: SceneGeometry,
+    planned: Sequence[MountedSensor],
+    recording: str,
+    found: Verification,
+    versions: Mapping[str, str],
+) -> None:
+    """Write all files of a verification to a folder; the catalogue of units only if some gain is known.
+
+    Parameters
+    ----------
+    recording : str
+        Name of the recording.
+    versions : mapping of str to str
+        Versions of the program and its libraries.
+    """
+    changes, returns = VERIFICATION_PICTURES
+    save_changes_picture(folder / changes, geometry, planned, found)
+    save_returns_chart(folder / returns, found)
+    save_changes(folder / CHANGES_FILE, found)
+    save_units(folder / UNITS_FILE, recording, found)
+    record = verification_record(geometry.name, recording, found)
+    save_json(folder / VERIFICATION_FILE, record | {"versions": dict(versions)})
 
 
 def record_of(site: str, recording: str, found: Verification) -> VerificationRecord:
@@ -44,8 +71,8 @@ def verification_record(site: str, recording: str, found: Verification) -> dict[
     return {"schema": SCHEMA, **as_json(record_of(site, recording, found))}
 
 
-def save_units(path: Path, recording: str, found: Verification) -> bool:
-    """Write a catalogue with a model for each unit whose gain is known, and return whether there is one."""
+def save_units(path: Path, recording: str, found: Verification) -> None:
+    """Write a catalogue with a model for each unit whose gain is known, if there is one."""
     pairs = zip(found.comparisons, found.sensors, strict=True)
     known = [(one.sensor, installed.gain) for one, installed in pairs if installed.gain is not None]
     keys = [re.sub(r"[^a-z0-9]", "_", f"{sensor.model.key}_{sensor.label}".lower()) for sensor, _ in known]
@@ -60,7 +87,6 @@ def save_units(path: Path, recording: str, found: Verification) -> bool:
     if tables:
         with whole_file(path) as temporary:
             temporary.write_text("\n".join(tables), encoding="utf-8")
-    return bool(tables)
 
 
 def save_changes(path: Path, found: Verification) -> None:

@@ -1,9 +1,10 @@
 import numpy as np
+import pytest
 import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 
-from seip_addon.core.geometry.plan import closed, outline, plane_height, signed_area, surface_height
+from seip_addon.core.geometry.plan import closed, opened, outline, plane_height, signed_area, surface_height
 from tests.oracles.random_cases import cases
 
 corner = st.tuples(st.integers(-50, 50), st.integers(-50, 50), st.integers(-5, 5))
@@ -31,6 +32,19 @@ def test_an_outline_covers_what_its_triangles_cover(some):
 def test_gaps_up_to_twice_the_width_are_closed():
     parts = shapely.union_all([shapely.box(0, 0, 4, 4), shapely.box(4.1, 0, 8, 4), shapely.box(8.3, 0, 12, 4)])
     assert shapely.get_num_geometries(closed(parts, 0.06)) == 2
+
+
+def test_an_area_is_not_lost_where_two_corners_nearly_coincide():
+    """Their distance is 2.5 micrometres, in an arm as wide as what is taken away."""
+    corners = [
+        *((47.816614171937886, 14.396419022058208), (50.79204592757332, 14.216084345448337)),
+        *((60.665343409516126, 13.617784498036997), (70.53864340951611, 13.019484498036997)),
+        *((70.47815659048388, 12.021315501963004), (50.731556590483876, 13.217915501963004)),
+        *((50.73155407978447, 13.217915778271115), (47.7599578699025, 13.398017866333994)),
+        *((47.03476235359321, 0.6182592897469114), (-2.398384008639733, 1.639557291456637)),
+    ]
+    area = shapely.Polygon(corners)
+    assert opened(area, 1.0).area == pytest.approx(area.area, rel=0.02)
 
 
 @given(triangles, st.floats(-50, 50), st.floats(-50, 50))

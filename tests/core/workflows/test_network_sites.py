@@ -52,6 +52,7 @@ def test_table_with_names_weights_and_any_usual_delimiter(tmp_path):
         ("source,latitude,longitude\nmap.osm,95,7\n", "row 2: the latitude must be"),
         ("source,latitude,longitude,weight\nmap.osm,54,7,-1\n", "row 2: the weight must be"),
         ("source,latitude,longitude\nnone.osm,54,7\n", "row 2: there is no file"),
+        ("latitude,longitude,source\n54,7\n", "row 2: there is no file"),
         ("source,latitude,longitude\nmap.osm,54,7\n\nmap.osm,54,7.0002\n", "rows 2 and 4 are 13 m apart"),
     ],
 )

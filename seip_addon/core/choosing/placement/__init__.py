@@ -1,1 +1,1 @@
-"""Sensor placement: the maximal covering location problem, solved with a bound on the optimum."""
+"""Sensor placement: a sum of concave values of targets, with the best placement found and a bound on all."""

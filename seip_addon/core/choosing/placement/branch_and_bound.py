@@ -175,7 +175,7 @@ class BranchAndBound:
                 self._push(found[0], -found[0].rank)
         self._spare = 0.0
         self._note(self.bound)
-        yield self.incumbent.progress("bounding")
+        yield self.incumbent.progress("computing an upper bound")
         return rank
 
     def _root(self, root: _Node, begin: Float) -> Generator[Progress, None, tuple[_Node, Float] | None]:
@@ -199,7 +199,7 @@ class BranchAndBound:
             before = bound.value
             if self.incumbent.work.left > self._spare:
                 bound = self._steps(problem, bound, ROUND)
-            yield self.incumbent.progress("bounding")
+            yield self.incumbent.progress("computing an upper bound")
             within = np.flatnonzero(bound.forced() >= self.incumbent.least_better)
             if not len(within):
                 return None
@@ -301,7 +301,7 @@ class BranchAndBound:
         """Return the problem of a node, and its targets."""
         whole = self._block.together(node.chosen)
         targets = self._block.open_targets(whole)
-        block, base = self._block.of(left, targets), whole[targets]
+        block, base = self._block.one_of_many(left, targets), whole[targets]
         raised = self._rounding + self._block.value_at(whole) - block.value_at(base)
         first = np.intersect1d(node.first, left)
         rest = rest_of(self.instance, node.chosen, left, node.composition)

@@ -137,7 +137,7 @@ class _Cheapest:
         for _, lower in zip(range(BOUND_STEPS), steps, strict=False):
             bound = lower
             self._work.spend(block.operations)
-            yield Progress(0, 0, "bounding the price")
+            yield Progress(0, 0, "computing a lower bound of the price")
         least = max(least_price(rest, bound, goal), float(instance.price.min()))
         if self._equal_prices and least > 0:
             single = float(instance.price[0])

@@ -161,6 +161,10 @@ class ConcaveSum:
             return type(self)(self.amounts[keep], self.weight, self.g)
         return type(self)(self.amounts[keep].take(targets, axis=1), self.weight[targets], self.g)
 
+    def one_of_many(self, keep: Integer, targets: Integer) -> Self:
+        """Return `of`, sooner where many are taken from the same sum."""
+        return self.of(keep, targets)
+
     def together(self, chosen: Integer) -> Float:
         """Return the amounts of chosen candidates together at each target, (t,) float64."""
         together: Float = self.amounts[chosen].sum(axis=0, dtype=np.float64)
@@ -239,15 +243,12 @@ class _LastGains:
     gains : (c,) float64
     uses : int
         Number of results since the last one that was computed in full.
-    by_target : (t, c) float, optional
-        Amounts by target.
     """
 
     def __init__(self) -> None:
         self.each: Float = np.zeros(0)
         self.gains: Float = np.zeros(0)
         self.uses = 0
-        self.by_target: NDArray[np.floating[Any]] | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -268,12 +269,19 @@ class StepSum(ConcaveSum):
         """A product with the part of the matrix that has changed."""
         return 0.15 * self.amounts.size
 
-    @property
+    @cached_property
     def by_target(self) -> NDArray[np.floating[Any]]:
         """Amounts by target, (t, c)."""
-        if self._last.by_target is None:
-            self._last.by_target = np.ascontiguousarray(self.amounts.T)
-        return self._last.by_target
+        return np.ascontiguousarray(self.amounts.T)
+
+    @cached_property
+    def _bytes(self) -> NDArray[np.uint8]:
+        return self.amounts.astype(np.uint8)
+
+    def one_of_many(self, keep: Integer, targets: Integer) -> Self:
+        """Return `of`; bytes are gathered in less than half the time of floats."""
+        amounts = self._bytes[keep].take(targets, axis=1).astype(self.amounts.dtype)
+        return type(self)(amounts, self.weight[targets], self.g)
 
     def together(self, chosen: Integer) -> Float:
         """Return how many of the chosen candidates see each target: small whole numbers, exact in any precision."""

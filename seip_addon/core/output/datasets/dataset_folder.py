@@ -1,26 +1,59 @@
 """A dataset's folder: samples run by run, and ``manifest.json`` with settings, counts and digests."""
 
 import hashlib
-import json
 from collections import Counter
-from collections.abc import Callable, Generator, Iterable
+from collections.abc import Callable, Generator, Iterable, Mapping
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from ...errors import SeipError
 from ...progress import Progress
 from ...sensing.scans.frame import Frame
-from ...storage.files import digest, save_json, whole_file
+from ...storage.files import digest, parse_json, save_json, whole_file
+from ...storage.json_dataclass import from_json
 from ..results.versions import versions
 from .formats import Format
 from .sample import OUTCOMES, SPLITS, Sample, TrafficRun, make_sample, require_file_name
 
 SCHEMA = "seip-dataset/1"
 MANIFEST = "manifest.json"
-PARTS = {"format", "settings", "classes", "runs", "files"}
-
 Record = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class _StoredSample:
+    """Part of a sample in a manifest that is read."""
+
+    name: str
+    frame: str
+    files: Mapping[str, str]
+
+
+@dataclass(frozen=True)
+class _StoredRun:
+    """Part of a run in a manifest that is read."""
+
+    name: str
+    split: Literal["train", "val", "test"]
+    key: str
+    simulation_key: str
+    finished: bool
+    first: int
+    frames: int
+    samples: tuple[_StoredSample, ...]
+
+
+@dataclass(frozen=True)
+class _StoredDataset:
+    """Part of a manifest that is read."""
+
+    format: str
+    settings: Mapping[str, object]
+    classes: Mapping[str, str]
+    runs: tuple[_StoredRun, ...]
+    files: Mapping[str, str]
 
 
 def write_dataset(
@@ -79,17 +112,16 @@ def load_manifest(folder: str | Path) -> Record:
     """Return the manifest of a dataset; raise `SeipError` if there is none, or it is damaged or of another version."""
     path = Path(folder) / MANIFEST
     try:
-        manifest = json.loads(path.read_text(encoding="utf-8"))
+        manifest = parse_json(path.read_bytes())
         known = manifest["schema"] == SCHEMA
-        complete = not known or manifest.keys() >= PARTS
+        if known:
+            from_json(_StoredDataset, manifest)
     except FileNotFoundError as error:
         raise SeipError(f"there is no dataset in {folder}: it has no {MANIFEST}; write one") from error
     except (OSError, ValueError, TypeError, LookupError, AttributeError, RecursionError) as error:
         raise SeipError(f"{path} is damaged; delete the folder and write the dataset again") from error
     if not known:
         raise SeipError(f"{path} is not of this version; write the dataset again into another folder")
-    if not complete:
-        raise SeipError(f"{path} lacks a part; delete the folder and write the dataset again")
     return dict(manifest)
 
 

@@ -81,7 +81,7 @@ def save_close_ups(  # what both kinds of pictures show
     for row, view, sensor in zip(rows, views, sensors, strict=False):
         row.append(_labelled(view, sensor, places[sensor.label], site.attribution))
     with whole_file(path) as temporary:
-        close_up_sheet(rows).save(temporary, format="PNG", optimize=True)
+        close_up_sheet(rows).save(temporary, format="PNG")
 
 
 def _plan(content: MapContent, sensor: Sensor) -> Image.Image:

@@ -80,12 +80,14 @@ def as_png(figure: Figure) -> bytes:
     ((200, 150), 0)
     """
     drawn = io.BytesIO()
-    figure.savefig(drawn, format="rgba")
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "Glyph")  # letters that the type lacks are boxes, as in reports
+        figure.savefig(drawn, format="rgba")
     pixels = Image.frombytes("RGBA", figure.canvas.get_width_height(), drawn.getvalue()).convert("RGB")
     # Octrees keep rare colours, which here carry meaning; the median cut would mix them with frequent ones.
     picture = pixels.quantize(256, Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE)
     content = io.BytesIO()
-    picture.save(content, format="PNG", optimize=True, dpi=(figure.dpi, figure.dpi))
+    picture.save(content, format="PNG", dpi=(figure.dpi, figure.dpi))
     return content.getvalue()
 
 
@@ -179,7 +181,7 @@ def text_width(words: str, size: float, weight: str = "normal") -> float:
     font = _font(weight)
     font.set_size(MEASURED_SIZE, 72)  # each time: figures set the size of the same font
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # of letters that the type lacks, which drawing tells of
+        warnings.simplefilter("ignore")  # of letters that the type lacks
         font.set_text(words, 0.0, flags=LoadFlags.NO_HINTING)
     return float(font.get_width_height()[0]) / 64.0 * size / MEASURED_SIZE / 72.0
 

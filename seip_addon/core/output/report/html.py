@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import re
 from collections.abc import Iterable
 from html import escape
 
@@ -10,6 +11,8 @@ from .blocks import Block, Bullets, Card, Code, Facts, Paragraph, Picture, Pictu
 
 POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'"
 """Nothing is fetched, and no script runs, whatever stands in the page."""
+
+_DIRECTIONS = re.compile("[\u202a-\u202e\u2066-\u2069]")
 
 STYLE = """
 body { font: 16px/1.5 system-ui, sans-serif; color: #1d2b36; max-width: 60em; margin: 2em auto; padding: 0 1em; }
@@ -61,11 +64,16 @@ code { display: block; background: #eef1f3; padding: .6em .8em; overflow-wrap: a
 def as_html(report: Report) -> str:
     """Return the page."""
     sections = "\n".join(
-        f"<section>\n<h2>{escape(section.title)}</h2>\n{_blocks(section.blocks)}\n</section>"
+        f"<section>\n<h2>{_shown(section.title)}</h2>\n{_blocks(section.blocks)}\n</section>"
         for section in report.sections
     )
-    header = f'<h1>{escape(report.title)}</h1>\n<p class="subtitle">{escape(report.subtitle)}</p>'
+    header = f'<h1>{_shown(report.title)}</h1>\n<p class="subtitle">{_shown(report.subtitle)}</p>'
     return page(report.title, f"<header>\n{header}\n{_blocks(report.first)}\n</header>\n{sections}")
+
+
+def _shown(text: str) -> str:
+    """Return a text for a page, without marks by which a name would reverse the order of what follows it."""
+    return escape(_DIRECTIONS.sub("", text))
 
 
 def page(title: str, body: str, style: str = "") -> str:
@@ -76,7 +84,7 @@ def page(title: str, body: str, style: str = "") -> str:
 <meta charset="utf-8">
 <meta http-equiv="Content-Security-Policy" content="{escape(POLICY)}">
 <meta name="viewport" content="width=device-width, initial-scale=1">
-<title>{escape(title)}</title>
+<title>{_shown(title)}</title>
 <style>{STYLE}{style}</style>
 </head>
 <body>
@@ -93,18 +101,18 @@ def _blocks(blocks: Iterable[Block]) -> str:
 def _block(block: Block) -> str:
     if isinstance(block, Paragraph | Code):
         tag = "p" if isinstance(block, Paragraph) else "code"
-        html = f"<{tag}>{escape(block.text)}</{tag}>"
+        html = f"<{tag}>{_shown(block.text)}</{tag}>"
     elif isinstance(block, Bullets):
-        html = "<ul>\n" + "\n".join(f"<li>{escape(line)}</li>" for line in block.lines) + "\n</ul>"
+        html = "<ul>\n" + "\n".join(f"<li>{_shown(line)}</li>" for line in block.lines) + "\n</ul>"
     elif isinstance(block, Facts):
-        rows = "\n".join(f"<dt>{escape(name)}</dt><dd>{escape(value)}</dd>" for name, value in block.rows)
+        rows = "\n".join(f"<dt>{_shown(name)}</dt><dd>{_shown(value)}</dd>" for name, value in block.rows)
         kind = ' class="large"' if block.large else ""
         html = f"<dl{kind}>\n{rows}\n</dl>"
     elif isinstance(block, Card):
-        html = f'<div class="card">\n<h3>{escape(block.title)}</h3>\n{_blocks(block.blocks)}\n</div>'
+        html = f'<div class="card">\n<h3>{_shown(block.title)}</h3>\n{_blocks(block.blocks)}\n</div>'
     elif isinstance(block, Picture):
         kind = ' class="tall"' if block.tall else ""
-        caption = f"<figcaption>{escape(block.caption)}</figcaption>"
+        caption = f"<figcaption>{_shown(block.caption)}</figcaption>"
         html = f"<figure{kind}>{_image(block.png, block.caption)}{caption}</figure>"
     elif isinstance(block, Pictures):
         images = "".join(_image(png, block.about) for png in block.pngs)
@@ -118,10 +126,10 @@ def _block(block: Block) -> str:
 
 def _image(png: bytes, caption: str) -> str:
     source = f"data:image/png;base64,{base64.b64encode(png).decode('ascii')}"
-    return f'<img src="{source}" alt="{escape(caption)}">'
+    return f'<img src="{source}" alt="{_shown(caption)}">'
 
 
 def _row(table: Table, cells: tuple[str, ...], tag: str) -> str:
     kinds = (' class="number"' if column in table.numbers else "" for column in range(len(cells)))
-    inner = "".join(f"<{tag}{kind}>{escape(cell)}</{tag}>" for kind, cell in zip(kinds, cells, strict=True))
+    inner = "".join(f"<{tag}{kind}>{_shown(cell)}</{tag}>" for kind, cell in zip(kinds, cells, strict=True))
     return f"<tr>{inner}</tr>"

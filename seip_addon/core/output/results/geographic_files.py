@@ -7,6 +7,7 @@ import os
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from html import escape
 from typing import Any
 from xml.etree import ElementTree as ET
 
@@ -194,7 +195,7 @@ def save_kml(path: str | os.PathLike[str], placed: Located) -> None:
     document = ET.SubElement(root, "Document")
     _text(document, "name", placed.site.name)
     if placed.site.attribution:
-        _text(document, "description", "\n".join(placed.site.attribution))
+        _text(document, "description", escape("\n".join(placed.site.attribution), quote=False))  # shown as HTML
     for name, (line, fill, opacity) in KML_STYLES.items():
         style = ET.SubElement(document, "Style", {"id": name})
         drawn = ET.SubElement(style, "LineStyle")
@@ -213,7 +214,7 @@ def save_kml(path: str | os.PathLike[str], placed: Located) -> None:
             "tilt_deg": f"{tilt_degrees(sensor.tilt):.3f}",
             "price_usd": f"{sensor.price:.2f}",
         }
-        words = f"{sensor.model.name}, {sensor.height:.2f} m above the ground{sensor.turned}"
+        words = escape(f"{sensor.model.name}, {sensor.height:.2f} m above the ground{sensor.turned}", quote=False)
         point = ET.SubElement(_placemark(sensors, sensor.label, "description", words, about), "Point")
         _text(point, "extrude", "1")
         _text(point, "altitudeMode", "relativeToGround")

@@ -85,7 +85,9 @@ def _of_kitti(text: str) -> Float:
     if key is None:
         raise ValueError("it has none of Tr_velo_to_world, Tr_velo_to_cam and Tr")
     pose = np.vstack([np.array(lines[key].split(), dtype=np.float64).reshape(3, 4), [0.0, 0.0, 0.0, 1.0]])
-    return pose if key == "Tr_velo_to_world" else _CAMERA_TO_SITE @ pose
+    if key != "Tr_velo_to_world" and np.isfinite(pose).all():  # products warn of other numbers, which are refused later
+        pose = _CAMERA_TO_SITE @ pose
+    return pose
 
 
 def _pose(name: str, matrix: Any) -> Pose:  # noqa: ANN401  # lists of numbers, if all is well

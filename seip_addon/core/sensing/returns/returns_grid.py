@@ -79,7 +79,7 @@ def returns_key(site: Site, users: RoadUsers, models: Mapping[str, LidarModel], 
     """
     candidates = site.candidates
     used = find_models(models, np.unique(candidates.sensor).tolist())
-    inputs: list[NDArray[np.generic] | str | float] = [FILE.schema, source_digest(__name__), engine]
+    inputs: list[NDArray[np.generic] | str | float] = [FILE.schema, source_digest(), engine]
     inputs += [site.triangles, users.xyz, users.body, candidates.xyz, candidates.yaw, candidates.tilt]
     inputs.append(np.array([list(used).index(key) for key in candidates.sensor], dtype=np.int64))
     for model in used.values():

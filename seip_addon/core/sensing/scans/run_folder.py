@@ -13,8 +13,9 @@ import numpy as np
 from ...arrays import Float
 from ...errors import SeipError
 from ...progress import Progress
-from ...storage.files import digest, save_json
+from ...storage.files import digest, parse_json, save_json
 from ...storage.folder_contents import MANIFEST, check_no_placement
+from ...storage.json_dataclass import from_json
 from ...storage.source_digest import source_digest
 from ..lidar.model import LidarModel
 from ..traffic.bodies import Body
@@ -27,6 +28,31 @@ from .static_scene import StaticScene
 SCHEMA = "seip-run/1"
 FRAMES = "frames"
 Record = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class _StoredSensor:
+    """Part of a sensor in a manifest that is read."""
+
+    sensor: str
+
+
+@dataclass(frozen=True)
+class _StoredTraffic:
+    """Part of the trajectories in a manifest that is read."""
+
+    source: str
+
+
+@dataclass(frozen=True)
+class _StoredRun:
+    """Part of a manifest that is read."""
+
+    key: str
+    complete: bool
+    sensors: tuple[_StoredSensor, ...]
+    trajectories: _StoredTraffic
+    frames: tuple[Mapping[str, object], ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +96,7 @@ class Run:
         return digest(
             SCHEMA,
             self.versions["seip"],
-            source_digest(__name__),
+            source_digest(),
             json.dumps(asdict(self.settings)),
             *(self.static.triangles, self.static.reflectivity, self.static.region.wkb, self.origin, self.times),
             *(users, *motion, *sensors, *models),
@@ -160,17 +186,16 @@ def load_manifest(folder: Path) -> Record:
     """
     path = folder / MANIFEST
     try:
-        record = json.loads(path.read_text(encoding="utf-8"))
+        record = parse_json(path.read_bytes())
         known = record["schema"] == SCHEMA
-        whole = {"key", "complete", "sensors", "trajectories", "frames"} <= set(record)
+        if known:
+            from_json(_StoredRun, record)
     except FileNotFoundError as error:
         raise SeipError(f"{folder} does not contain a run of scans: make one with seip simulate") from error
     except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError) as error:
         raise SeipError(f"{path} is damaged: delete the folder and simulate again") from error
     if not known:
         raise SeipError(f"{path} was written by another version: delete the folder and simulate again")
-    if not whole:
-        raise SeipError(f"{path} is damaged: delete the folder and simulate again")
     return dict(record)
 
 
@@ -185,8 +210,9 @@ def load_frames(folder: Path) -> Iterator[tuple[str, Frame]]:
     record = load_manifest(folder)
     if not record["complete"]:
         raise SeipError(f"the run in {folder} was stopped half-way: run the same simulation again to finish it")
-    for entry in record["frames"]:
-        yield entry["name"], Frame.load(folder / FRAMES / f"{entry['name']}.npz")
+    for number in range(len(record["frames"])):
+        path = frame_path(folder, number)
+        yield path.stem, Frame.load(path)
 
 
 def frame_path(folder: Path, number: int) -> Path:

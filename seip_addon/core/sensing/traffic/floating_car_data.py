@@ -383,7 +383,8 @@ def _read_csv(path: str | os.PathLike[str], rows: _Rows) -> Generator[Progress, 
                 if number % _LINES_PER_REPORT == 0:
                     yield progress()
         except (UnicodeDecodeError, csv.Error) as error:
-            raise SeipError(f"{Path(path).name} is not a csv table ({error}); write it again") from error
+            reason = error if isinstance(error, csv.Error) else "it is not in UTF-8"
+            raise SeipError(f"{Path(path).name} is not a csv table ({reason}); write it again") from error
 
 
 def _take_line(cells: Attributes, rows: _Rows) -> None:

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from ...arrays import Boolean, Float, Integer
+from ...limits import MAP_COORDINATE, ROAD_USER_SIZE, SHARE, SPEED, TIME, UNWRAPPED_ANGLE, Limits
 from ...storage.array_file import ArrayFile
 from ...storage.files import digest
 
@@ -239,7 +240,9 @@ class Trajectories:
         """
         with FILE.reading(path) as (header, arrays):
             users = tuple(_from_record(user) for user in header["users"])
-            return cls(users=users, source=str(header["source"]), **{name: arrays[name] for name in _ARRAYS})
+            loaded = cls(users=users, source=str(header["source"]), **{name: arrays[name] for name in _ARRAYS})
+            _check(loaded)
+            return loaded
 
 
 @dataclass(frozen=True, eq=False)
@@ -284,3 +287,28 @@ def is_shape(values: Sequence[object]) -> bool:
     """Return whether values are a shape of a road user."""
     bends = [abs(value) for value in values if isinstance(value, int | float)]
     return len(bends) == len(values) == 4 and sum(bends[:2]) <= MAX_BEND and sum(bends[2:]) <= MAX_BEND
+
+
+def _check(run: Trajectories) -> None:
+    """Raise ValueError if shapes contradict each other, or a number is not plausible or out of order."""
+    samples = len(run.time)
+    shapes = dict.fromkeys(SAMPLED, (samples,)) | {"position": (samples, 3), "origin": (3,)}
+    shapes |= {"first": (len(run.users) + 1,)}
+    wrong = [name for name, shape in shapes.items() if getattr(run, name).shape != shape]
+    if wrong or run.first[0] != 0 or run.first[-1] != samples or (np.diff(run.first) < 1).any():
+        raise ValueError(f"{(*wrong, 'first')[0]} does not fit the other arrays")
+    steps = np.delete(np.diff(run.time), run.first[1:-1] - 1)
+    sizes = [(user.length, user.width, user.height) for user in run.users]
+    numbers = {
+        "a time": (run.time, TIME),
+        "a coordinate": (np.append(run.position, run.origin), MAP_COORDINATE),
+        "an angle": (np.append(run.yaw, run.pitch), UNWRAPPED_ANGLE),
+        "a speed": (run.speed, SPEED),
+        "a size": (np.array(sizes, dtype=np.float64), ROAD_USER_SIZE),
+        "a paint": (np.array([user.paint for user in run.users], dtype=np.float64), SHARE),
+    }
+    known = all(
+        isinstance(user.name, str) and user.category in CATEGORIES and is_shape(user.shape) for user in run.users
+    )
+    if (fault := Limits.first_fault(numbers)) or (steps <= 0.0).any() or not known:
+        raise ValueError(fault or "times do not increase, or a road user is of no known kind")

@@ -120,7 +120,7 @@ def visibility_key(site: Site, models: Mapping[str, LidarModel], settings: Visib
     """
     used = _used_models(site, models)
     model_index = np.array([list(used).index(key) for key in site.candidates.sensor], dtype=np.int64)
-    inputs: list[NDArray[Any] | str | float] = [FILE.schema, source_digest(__name__), engine]
+    inputs: list[NDArray[Any] | str | float] = [FILE.schema, source_digest(), engine]
     strengths = {model.key: settings.least_strength(model) for model in used.values()}
     inputs.append(float(settings.delta))
     inputs += [str((least, repr(used[key].law) if least > 0 else "")) for key, least in strengths.items()]

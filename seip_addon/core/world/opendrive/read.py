@@ -5,12 +5,14 @@ Written after ASAM OpenDRIVE 1.4 to 1.8; attributes that a file leaves out have 
 
 import math
 import os
+from collections import Counter
 from pathlib import Path
 
 import numpy as np
 
 from ... import limits
 from ...errors import SeipError
+from ...storage.xml_stream import short
 from .document import Node, read_document
 from .profile import ZERO_PROFILE, Profile, lateral_shape, profile
 from .read_objects import read_objects, read_signals
@@ -57,6 +59,9 @@ def read_map(path: str | os.PathLike[str]) -> RoadMap:
     roads = tuple(map(_road, nodes))
     if not roads:
         raise SeipError(f"{root.place} has no roads; choose an OpenDRIVE map with at least one <road>")
+    number, count = Counter(road.id for road in roads).most_common(1)[0]
+    if count > 1:  # links, lanes and objects name roads by their ids
+        raise SeipError(f"{root.place} has {count:,} roads with the id {short(number)}; export the map again")
     header = root.child("header")
     offset, reference = (header and header.child(name) for name in ("offset", "geoReference"))
     return RoadMap(

@@ -1,1 +1,1 @@
-"""OpenStreetMap: streets of an extract as an OpenDRIVE map, and the objects next to them."""
+"""OpenStreetMap: streets of an extract, laid out by netconvert, and the objects next to them."""

@@ -20,10 +20,10 @@ from .description import (
 )
 from .lane_markings import markings, stop_lines
 from .parts import Part
-from .road_surface import SurfaceLayers, without_crumbs
+from .road_surface import SNAP_GRID, SurfaceLayers, without_crumbs
 from .site_ground import MIN_PASSAGE, SiteGround, triangles_of
 from .street_areas import MAX_MAPPED, StreetAreas
-from .terrain import Terrain
+from .terrain import Terrain, triangulate
 
 MIN_HOLE = 0.01  # square metres: smaller holes of a carriageway are rounding
 CANDIDATE_MARGIN = 15.0  # how far outside the region of interest (metres) a new post may stand
@@ -227,7 +227,13 @@ def area_part(
 ) -> Part:
     """Return an area in plan as an overlay on the ground; ``step`` raises it above other areas of the same role."""
     above, material = AREA_OVERLAYS[role]
-    triangles = street.terrain.drape(area, spacing=OVERLAY_SPACING, above=above + step * OVERLAY_STEP)
+    above += step * OVERLAY_STEP
+    beyond = np.empty((0, 3, 3))
+    if not street.extent.covers(area):  # there is no ground to follow: a grid over kilometres would take minutes
+        plan = triangulate(area.difference(street.extent, grid_size=SNAP_GRID))
+        beyond = np.dstack([plan, street.terrain.height(plan.reshape(-1, 2)).reshape(-1, 3) + above])
+        area = area.intersection(street.extent, grid_size=SNAP_GRID)
+    triangles = np.concatenate([street.terrain.drape(area, spacing=OVERLAY_SPACING, above=above), beyond])
     return Part(name, from_faces(triangles, material), (role,), weight=weight)
 
 

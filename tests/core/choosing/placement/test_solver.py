@@ -148,7 +148,7 @@ def test_reports_show_a_placement_and_its_gap_and_these_only_improve():
     assert found == sorted(found)
     assert len(gaps) > 3
     assert gaps == sorted(gaps, reverse=True)
-    assert {step.what for step in steps} >= {"choosing greedily", "improving the placement", "bounding"}
+    assert {step.what for step in steps} >= {"choosing greedily", "improving the placement", "computing an upper bound"}
     pace = Pace()
     for number, step in enumerate(steps):
         pace.note(step, float(number))

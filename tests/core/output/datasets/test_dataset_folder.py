@@ -1,5 +1,6 @@
 """What holds for every format: whole files, the manifest, runs and splits, and what is refused."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -116,7 +117,27 @@ def test_frames_do_not_leak_from_one_split_into_another(tmp_path):
 @pytest.mark.parametrize("text", ["[]", '{"schema": "seip-dataset/0"}', '{"schema": "seip-dataset/1"}'])
 def test_a_manifest_that_is_none_is_refused(text, tmp_path):
     (tmp_path / "manifest.json").write_text(text)
-    refused("manifest.json (is|lacks)", "kitti", make_frames(), make_run(), tmp_path)
+    refused("manifest.json is", "kitti", make_frames(), make_run(), tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("key", "wrong"),
+    [
+        *((key, 5) for key in ("format", "settings", "classes", "runs", "files")),
+        *(
+            ("runs", {name: 1.5})
+            for name in ("name", "split", "key", "simulation_key", "finished", "frames", "samples")
+        ),
+        ("runs", {"samples": [{"name": "a", "frame": "a", "files": 5}]}),
+    ],
+)
+def test_a_manifest_with_a_wrong_value_is_refused(tmp_path, key, wrong):
+    write("kitti", make_frames(), make_run(), tmp_path)
+    path = tmp_path / "manifest.json"
+    record = json.loads(path.read_text(encoding="utf-8"))
+    record[key] = [record["runs"][0] | wrong] if isinstance(wrong, dict) else wrong
+    path.write_text(json.dumps(record), encoding="utf-8")
+    refused("manifest.json is damaged", "kitti", make_frames(), make_run("b"), tmp_path)
 
 
 @pytest.mark.parametrize("name", ["", "..", "a/b", "ä\n"])

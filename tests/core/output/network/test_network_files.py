@@ -76,7 +76,6 @@ def test_the_record_survives_its_file_and_the_same_record_gives_the_same_bytes(t
     assert b"(D:20260102030405Z)" in (tmp_path / "a" / "report.pdf").read_bytes()
 
 
-@pytest.mark.filterwarnings("ignore:Glyph")
 def test_names_stay_text(tmp_path):
     record = hostile_network()
     write_network(tmp_path, record)
@@ -105,7 +104,6 @@ def test_people_read_products_and_programs_read_types(tmp_path):
     assert any("× os1_128" in row["types"] for row in rows_of(tmp_path / "sites.csv"))
 
 
-@pytest.mark.filterwarnings("ignore:Glyph")
 def test_the_page_links_to_nothing_but_the_folders_of_its_sites():
     page = network_page(hostile_network(), make_streets())
     links = Page(page).links

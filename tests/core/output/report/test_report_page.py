@@ -91,7 +91,7 @@ def test_names_stay_text(page):
     assert "script" not in page.tags
     assert "i" not in page.tags
     assert NAME in page.text
-    assert "Mill Lane <i>" in page.text
+    assert "Mill Lane <i>" in page.text  # without the mark that would reverse the order of what follows
     assert "Type 2 (32 channels): sees <far>." in page.text
 
 

@@ -26,7 +26,8 @@ NAMES = {"k": NAMESPACE}
 def example() -> Example:
     made = make_example()
     place = GeoReference("EPSG:32632", (*OFFSET, 0.0))
-    return replace(made, site=replace(made.site, geo_reference=place, name="Crossing <b> & \x01"))
+    site = replace(made.site, geo_reference=place, name="Crossing <b> & \x01", attribution=("© <i>Town</i>",))
+    return replace(made, site=site)
 
 
 @pytest.fixture(scope="module")
@@ -40,7 +41,7 @@ def features(placed, tmp_path_factory):
     save_geojson(path, placed)
     collection = json.loads(path.read_text(encoding="utf-8"))
     assert collection["type"] == "FeatureCollection"
-    assert set(collection) == {"type", "name", "features"}
+    assert set(collection) == {"type", "name", "attribution", "features"}
     return collection["features"]
 
 
@@ -101,6 +102,9 @@ def test_kml_is_xml_with_the_same_content(example, placed, features, tmp_path):
     root = ET.parse(tmp_path / "placement.kml").getroot()  # noqa: S314  # our own
     assert root.tag == f"{{{NAMESPACE}}}kml"
     assert root.find("k:Document/k:name", NAMES).text == "Crossing <b> & �"
+    assert (
+        root.find("k:Document/k:description", NAMES).text == "© &lt;i&gt;Town&lt;/i&gt;"
+    )  # which viewers show as HTML
     sensors, areas, coverage = root.findall("k:Document/k:Folder", NAMES)
     for mark, sensor in zip(sensors.findall("k:Placemark", NAMES), example.deployment.sensors, strict=True):
         assert mark.find("k:Point/k:altitudeMode", NAMES).text == "relativeToGround"

@@ -122,6 +122,7 @@ def changed(at, value):
         ("16 numbers", "S1: [1, 2, 3]\n"),
         ("none of Tr_velo_to_world", "Tr_imu_to_velo: 1 0 0 0\n"),
         ("no readable poses", "Tr: 1 0 0\n"),
+        ("16 numbers", "Tr: 1 0 0 0 0 1 0 0 0 0 1 1e400\n"),
         ("no readable poses", "Tr_velo_to_world: 1 0 0 0 0 1 0 0 0 0 far 0\n"),
         ("is empty", ""),
     ],

@@ -128,6 +128,24 @@ def test_a_folder_of_other_settings_is_left_alone(tmp_path, changes) -> None:
     assert contents(tmp_path) == before
 
 
+@pytest.mark.parametrize(
+    ("key", "wrong"),
+    [
+        *[(key, 5) for key in ("key", "complete", "sensors", "trajectories", "frames")],
+        ("sensors", [[]]),
+        ("trajectories", {}),
+        ("frames", ["000000"]),
+    ],
+)
+def test_a_manifest_with_a_wrong_value_is_refused(tmp_path, key, wrong) -> None:
+    finish(steps(tmp_path, make_run()))
+    path = tmp_path / "manifest.json"
+    record = json.loads(path.read_text(encoding="utf-8"))
+    path.write_text(json.dumps(record | {key: wrong}), encoding="utf-8")
+    with pytest.raises(SeipError, match=r"manifest\.json is damaged: delete the folder and simulate again"):
+        list(load_frames(tmp_path))
+
+
 def test_a_manifest_of_another_version_has_its_sentence(tmp_path) -> None:
     (tmp_path / "manifest.json").write_text(json.dumps({"schema": "seip-run/9", "key": "", "frames": []}))
     with pytest.raises(SeipError, match="written by another version"):

@@ -2,6 +2,7 @@
 
 import gzip
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,8 +15,10 @@ from seip_addon.core.sensing.traffic.floating_car_data import (
     read_trajectories,
 )
 from seip_addon.core.sensing.traffic.source import read_net_offset
+from seip_addon.core.sensing.traffic.trajectories import SAMPLED, Trajectories
 from seip_addon.core.sensing.traffic.vehicle_types import BUILT_IN, CAR, VehicleType, read_vehicle_types
 from tests.builders.sumo_text import CONVERTED_CSV, FCD, NATIVE_CSV, NET, ROUTES
+from tests.builders.traffic_by_hand import make_trajectories
 
 
 def written(folder, name, text):
@@ -165,8 +168,42 @@ def test_damaged_or_missing_files_get_one_sentence(tmp_path):
     with pytest.raises(SeipError, match="cannot read"):
         read(tmp_path)
     (tmp_path / "f.csv").write_bytes(b"timestep_time;vehicle_id\n\xff\xff;a\n")
-    with pytest.raises(SeipError, match="not a csv table"):
+    with pytest.raises(SeipError, match="not a csv table \\(it is not in UTF-8\\)"):
         read(tmp_path / "f.csv")
+
+
+WAYS = ([(0.0, 1.0, 2.0, 0.0, 0.0, 0.0), (1.0, 5.0, 2.0, 0.0, 0.0, 0.0)], [(0.5, 9.0, 9.0, 0.0, 0.0, 0.0)])
+RUN = make_trajectories(*WAYS)
+CAR_1 = RUN.users[0]
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        *(
+            {name: np.full_like(getattr(RUN, name), wrong)}
+            for name in (*SAMPLED, "origin")
+            for wrong in (np.nan, 1e300)
+        ),
+        {"time": RUN.time[:-1]},
+        {"time": RUN.time[[1, 0, 2]]},
+        {"position": RUN.position[:, :2]},
+        {"first": np.array([0, 2])},
+        {"first": np.array([0, 3, 3])},
+        {"first": np.array([0, 4, 3])},
+        {"first": np.array([1, 2, 3])},
+        *({"users": (replace(CAR_1, **{name: 1e300}), CAR_1)} for name in ("length", "width", "height", "paint")),
+        {"users": (replace(CAR_1, category="boat"), CAR_1)},
+        {"users": (replace(CAR_1, name=7), CAR_1)},
+        {"users": (replace(CAR_1, shape=(0.5, 0.5, 0.0, 0.0)), CAR_1)},
+    ],
+)
+def test_trajectories_whose_numbers_are_wrong_are_refused(tmp_path, changes):
+    RUN.save(tmp_path / "run.npz")
+    assert Trajectories.load(tmp_path / "run.npz").key == RUN.key
+    replace(RUN, **changes).save(tmp_path / "wrong.npz")
+    with pytest.raises(SeipError, match="damaged or not a file of trajectories; import or simulate them again"):
+        Trajectories.load(tmp_path / "wrong.npz")
 
 
 def test_nobody_near_the_scene_is_refused(tmp_path):

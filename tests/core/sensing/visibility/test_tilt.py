@@ -21,7 +21,6 @@ from seip_addon.core.sensing.lidar.range_equation import RangeEquation
 from seip_addon.core.sensing.scans.sensor import level_orientation
 from seip_addon.core.sensing.scenarios.pose_errors import PoseErrors
 from seip_addon.core.sensing.scenarios.visibility_under_errors import visibility_under_errors
-from seip_addon.core.sensing.visibility import grid
 from seip_addon.core.sensing.visibility.grid import (
     FILE,
     VisibilitySettings,
@@ -145,7 +144,7 @@ def test_the_key_of_an_upright_grid_is_as_it_was_before_there_were_tilts():
     known = digest(
         *(
             FILE.schema,
-            source_digest(grid.__name__),
+            source_digest(),
             ANY,
             1.0,
             "(0.0, '')",

@@ -70,6 +70,11 @@ def test_a_number_without_sense_is_named_with_its_road_and_element(tmp_path, nam
     assert "\n" not in str(caught.value)
 
 
+def test_roads_with_one_id_are_named(tmp_path):
+    with pytest.raises(SeipError, match=r"has 300 roads with the id 7; export the map again"):
+        read_text(tmp_path, document(*[road(number="7")] * 300))
+
+
 def refused(path, message):
     with pytest.raises(SeipError, match=message):
         read_map(path)

@@ -72,7 +72,7 @@ def test_it_follows_bends_by_their_length(tmp_path):
 
 
 def test_it_does_not_climb_onto_a_bridge_over_the_end_of_a_road(tmp_path):
-    over = straight(9, 50, -60, 120, np.pi / 2, z=6.0)
+    over = straight(90, 50, -60, 120, np.pi / 2, z=6.0)
     text = town().replace("</OpenDRIVE>", f"{over}</OpenDRIVE>")
     assert region(tmp_path, text, approaches=60.0).bounds == pytest.approx((-70, -3.5, 70, 3.5), abs=0.1)
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import shapely
 
+from seip_addon.core.geometry.plan import signed_area
 from seip_addon.core.progress import finish
 from seip_addon.core.site.roles import Role
 from seip_addon.core.world.opendrive.read import read_map
@@ -192,6 +193,16 @@ def test_what_the_description_adds_stands_where_it_says(tmp_path):
     assert part(built, "Church").roles == (Role.FORBIDDEN_AREAS,)
     assert part(built, "School").roles == (Role.MANDATORY_AREAS,)
     assert len(with_role(built, Role.POLES)) == 2
+
+
+def test_an_area_far_larger_than_the_place_keeps_its_outline_in_few_triangles(tmp_path):
+    large = shapely.box(-12_000, -12_000, 12_000, 12_000)
+    built = model(tmp_path, replace(HERE, forbidden_areas=(Area("Town", large),)))
+    solid = part(built, "Town").solid
+    triangles = solid.vertices[np.array(solid.faces)]
+    assert len(triangles) < 10_000
+    assert signed_area(triangles).sum() == pytest.approx(large.area, rel=1e-6)
+    assert signed_area(triangles).min() > 0.0
 
 
 def test_lines_are_painted_between_lanes_but_not_in_the_junction(tmp_path):
