@@ -53,7 +53,7 @@ class Confidence:
         if not path.exists():
             return cls(detector.key, dict.fromkeys(CLASSES, (1.0, 0.0)))
         cure = "fit it again with headless/studies/fit_confidence.py, or remove it"
-        known = read_record(cls, path.read_bytes(), SCHEMA, path.name, cure)
+        known = read_record(cls, path.read_bytes(), (SCHEMA,), path.name, cure)
         if known.detector != detector.key:
             raise SeipError(f"{path.name} belongs to another detector: {cure}")
         if set(known.maps) != set(CLASSES) or min(slope for slope, _ in known.maps.values()) <= 0.0:

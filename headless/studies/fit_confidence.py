@@ -16,12 +16,11 @@ from headless import runtime
 from headless.detect_recording import LEAST_CONFIDENCE
 from headless.detection.confidence import SUFFIX, Confidence
 from headless.detection.detector import Detector
-from headless.detection.rotated_boxes import in_plan, iou_matrix
+from headless.detection.matching import overlaps
 from headless.detection.settings import CLASS_OF, CLASSES
 from headless.detection_results import read_detections
 
 import numpy as np
-import torch
 
 from seip_addon.core.arrays import Boolean, Float, Integer
 from seip_addon.core.sensing.recordings.box_labels import BoxLabels, read_labels
@@ -63,7 +62,7 @@ def _matched(detected: Path, labels: Path) -> tuple[Integer, Float, Boolean]:
     truth = Frame.load(labels).labels if labels.suffix == ".npz" else read_labels(labels)
     boxes = truth.boxes if isinstance(truth, BoxLabels) else np.column_stack([truth.centre, truth.size, truth.yaw])
     category = [CLASS_OF[name] for name in truth.category.tolist()]
-    overlap = iou_matrix(in_plan(torch.from_numpy(found.boxes)), in_plan(torch.from_numpy(boxes))).numpy()
+    overlap = overlaps(found.boxes, boxes)
     overlap[found.category[:, None] != np.array(category, dtype=np.int64)] = 0.0
     order = np.argsort(-found.score)
     for row in order:
