@@ -97,7 +97,7 @@ def match(frame: FrameResult, rule: Rule) -> Match:
     """Match the detections of a frame to its ground-truth boxes."""
     truth, detected = frame.truth, frame.detected
     counted, requested = counted_road_users(frame, rule), np.isin(detected.category, rule.categories)
-    overlap = np.where(requested[:, None], overlap_matrix(frame, rule), 0.0)
+    overlap = np.where(requested[:, None], overlaps(detected.boxes, truth.boxes, in_space=rule.in_space), 0.0)
     best = overlap.max(axis=1, initial=0.0)
     detection, road_user = np.full(len(truth), NO_MATCH), np.full(len(detected), NO_MATCH)
     # lexsort sorts by its last key first: by score, and equal scores by their best overlap. The loop cannot be
@@ -123,8 +123,8 @@ def counted_road_users(frame: FrameResult, rule: Rule) -> Boolean:
     return counts & (truth.parked if rule.parked else ~truth.parked)
 
 
-def overlap_matrix(frame: FrameResult, rule: Rule) -> Float:
-    """Return the intersection over union of each detection with each road user, (k, g) float64."""
-    detected, truth = torch.from_numpy(frame.detected.boxes), torch.from_numpy(frame.truth.boxes)
-    iou = iou_matrix_3d(detected, truth) if rule.in_space else iou_matrix(in_plan(detected), in_plan(truth))
+def overlaps(boxes: Float, others: Float, *, in_space: bool = False) -> Float:
+    """Return the intersection over union of boxes (k, 7) with others (g, 7), in plan or in space, (k, g)."""
+    one, other = torch.from_numpy(boxes), torch.from_numpy(others)
+    iou = iou_matrix_3d(one, other) if in_space else iou_matrix(in_plan(one), in_plan(other))
     return np.asarray(iou.numpy(), dtype=np.float64)
