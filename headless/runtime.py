@@ -21,16 +21,18 @@ from typing import NoReturn, TypeVar
 # as long where other work is on the same cores.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-from headless.process_end import end_without_freeing
+from headless.process_end import end_without_freeing, handle
 from headless.system_libraries import complaint, missing_libraries
 
 from seip_addon.core.acceptance import Acceptance
 from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import Progress, finish, progress_line, reporter
 from seip_addon.core.storage import files as storage
+from seip_addon.scene.interrupts import SIGNALS, held_signals
 
 try:
-    import bpy
+    with held_signals():
+        import bpy
     import defusedxml  # noqa: F401  # first of what the commands stand on, to be missed here rather than anywhere
     import highspy  # noqa: F401
     import matplotlib as mpl  # noqa: F401
@@ -172,8 +174,8 @@ def run(main: Callable[[list[str]], None]) -> NoReturn:
 
 def _run(main: Callable[[list[str]], None]) -> NoReturn:
     signal.signal(signal.SIGINT, signal.default_int_handler)  # Blender leaves SIGINT to the system
-    for number in (signal.SIGTERM, signal.SIGHUP):  # end in good order: half-written files are removed on the way out
-        signal.signal(number, lambda which, _frame: sys.exit(128 + which))
+    # The others end it in good order: half-written files are removed on the way out.
+    handle(SIGNALS[1:], lambda which, _frame: sys.exit(128 + which))
     try:
         try:
             main(refuse_pipes(arguments()))
