@@ -15,6 +15,7 @@ import threading
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from types import FrameType
 from typing import NoReturn, TypeVar
 
 # Before numpy is loaded: products shared out to threads depend on their number in the last digit, and take many times
@@ -173,18 +174,28 @@ def run(main: Callable[[list[str]], None]) -> NoReturn:
 
 
 def _run(main: Callable[[list[str]], None]) -> NoReturn:
-    signal.signal(signal.SIGINT, signal.default_int_handler)  # Blender leaves SIGINT to the system
-    # The others end it in good order: half-written files are removed on the way out.
-    handle(SIGNALS[1:], lambda which, _frame: sys.exit(128 + which))
+    received: list[int] = []
+
+    def stop(which: int, _frame: FrameType | None) -> NoReturn:
+        # An exception, so that half-written files are removed on the way out.
+        received.append(which)
+        raise KeyboardInterrupt if which == signal.SIGINT else SystemExit(128 + which)
+
+    signal.signal(signal.SIGINT, stop)  # Blender leaves SIGINT to the system
+    handle(SIGNALS[1:], stop)
     try:
         try:
             main(refuse_pipes(arguments()))
         finally:
             _leave_folders()
-    except SeipError as error:
-        _end(1, f"error: {error}")
-    except KeyboardInterrupt as stop:
-        _end(EXIT_STOPPED, str(stop) or "stopped, no result written")
+    except KeyboardInterrupt as interrupt:
+        _end(EXIT_STOPPED, str(interrupt) or "stopped, no result written")
+    except Exception as error:
+        if received:  # libraries in C that call Python turn the exception of a signal into one of their own
+            _end(128 + received[0], "stopped")
+        if isinstance(error, SeipError):
+            _end(1, f"error: {error}")
+        raise
     _end(0)
 
 

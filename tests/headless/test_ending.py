@@ -135,6 +135,18 @@ def test_signals_while_a_command_loads_end_it_without_traces(small_scene, tmp_pa
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_signals_that_a_library_turns_into_errors_of_its_own_end_the_command(number):
+    script = (
+        "import signal\nfrom headless import runtime\ndef main(_):\n"
+        f"    try:\n        signal.raise_signal({int(number)})\n"
+        "    except BaseException:\n        raise ValueError('Invalid bounding box') from None\n"  # as Matplotlib does
+        "runtime.run(main)"
+    )
+    done = run("-c", script)
+    assert (done.returncode, done.stderr) == (128 + number, "stopped\n")
+
+
 def test_commands_under_nohup_go_on_without_their_terminal():
     hang_up = "signal.raise_signal(signal.SIGHUP)"
     script = (
