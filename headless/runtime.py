@@ -195,6 +195,8 @@ def _run(main: Callable[[list[str]], None]) -> NoReturn:
             _end(128 + received[0], "stopped")
         if isinstance(error, SeipError):
             _end(1, f"error: {error}")
+        if isinstance(error, MemoryError):
+            _end(1, "error: there is not enough memory: choose a coarser grid, fewer candidates or smaller files")
         raise
     _end(0)
 

@@ -135,6 +135,13 @@ def test_signals_while_a_command_loads_end_it_without_traces(small_scene, tmp_pa
     assert not list(tmp_path.iterdir())
 
 
+def test_too_little_memory_is_one_sentence():
+    done = run("-c", "import numpy as np\nfrom headless import runtime\nruntime.run(lambda _: np.ones(1 << 50))")
+    assert done.returncode == 1
+    assert done.stderr.startswith("error: there is not enough memory: choose")
+    assert len(done.stderr.splitlines()) == 1
+
+
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_signals_that_a_library_turns_into_errors_of_its_own_end_the_command(number):
     script = (
