@@ -3,7 +3,7 @@
 import json
 import sys
 
-from seip_addon.core.output.results.placement_file import comparable, load_placement
+from seip_addon.core.output.results.placement_record import comparable, load_placement
 
 
 def lines(path: str) -> list[str]:

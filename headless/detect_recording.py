@@ -18,19 +18,20 @@ from typing import Any
 from headless import runtime
 from headless.charts.birds_eye import draw_birds_eye
 from headless.detection.average_precision import balanced_score, evaluate
+from headless.detection.confidence import Confidence
 from headless.detection.detection_area import DetectionArea
 from headless.detection.detector import Detector
 from headless.detection.detector_evaluation import DetectorEvaluation
-from headless.detection.frame_results import Detections, FrameResult, frame_result
+from headless.detection.frame_results import Detections, EvaluatedBoxes, FrameResult, frame_result
 from headless.detection.inference import detect
 from headless.detection.matching import Rule
 from headless.detection.pillars import grid_over
 from headless.detection.rules import MAIN_RULE
-from headless.detection.settings import BOTTOM, CLASS_CATEGORIES, CLASS_OF, TOP
+from headless.detection.settings import BOTTOM, TOP
 from headless.detection.suitability import suitability_warnings
 from headless.detection.traffic_ground import apart, moved_ground
 from headless.detection.training import deterministic
-from headless.detection_results import print_precision, save_charts, save_detections
+from headless.detection_results import print_precision, read_detections, save_charts, save_detections
 from headless.options import real_number
 
 import bpy
@@ -43,7 +44,6 @@ from seip_addon.core.arrays import Boolean, Float
 from seip_addon.core.errors import SeipError
 from seip_addon.core.geometry.plan import outline, surface_height
 from seip_addon.core.limits import Limits
-from seip_addon.core.output.datasets.formats import CLASSES, read_labels
 from seip_addon.core.output.results.detection_record import RECORDING_SCHEMA
 from seip_addon.core.output.results.versions import versions
 from seip_addon.core.progress import Progress
@@ -103,22 +103,8 @@ def save_video(path: Path, pictures: Sequence[Path], rate: float) -> None:
         bpy.data.scenes.remove(scene)
 
 
-RECOMMENDED_SCORE = 0.5
-"""Score from which detections in recordings are drawn and listed.
-
-Measured with the shipped detector on recordings simulated at the shipped junction and corridor (two OS1-128 each, 40
-sweeps in 40 s, background and ground estimated). Moving vehicles with 10 returns or more count as found if a box is
-within 2 m; vehicles near no road user are false. Recall is that within 50 and 80 m of a sensor.
-
-===== ================================== ================================
-score false vehicles per frame (80 m)    recall (50 m, 80 m)
-      junction, corridor                 junction; corridor
-===== ================================== ================================
-0.4   2.8, 2.4                           99.6 %, 88 %; 97 %, 96 %
-0.5   0.5, 0.5                           99.6 %, 87 %; 95 %, 90 %
-0.6   0.0, 0.0                           99.1 %, 85 %; 87 %, 80 %
-===== ================================== ================================
-"""
+LEAST_CONFIDENCE = 0.5
+"""Confidence from which detections in recordings are drawn and listed: those that are more likely true than false."""
 
 
 def area_of_recording(frames: RecordedFrames, detector: Detector, name: str) -> DetectionArea:
@@ -138,7 +124,7 @@ _LEAST_PER_BLOCK = 2  # frames
 _LISTED_OVERLAP, _LISTED_RETURNS = 0.5, 10  # at which listed vehicles count as found
 
 _COLUMNS = (
-    *("frame", "time_s", "category", "score"),
+    *("frame", "time_s", "category", "confidence"),
     *("x_m", "y_m", "z_m", "length_m", "width_m", "height_m", "yaw_deg", "apart"),
 )
 
@@ -186,7 +172,8 @@ def detect_recording(options: argparse.Namespace, detector: Detector) -> None:
     runtime.check_folder(options.output)
     sensors, recording = _opened(options)
     labels = _labels(options.labels, len(paired(recording)))
-    key = _key(options, recording, detector)
+    confidence = Confidence.of_detector(options.detector, detector)
+    key = _key(options, recording, confidence)
     frames = runtime.finish_with_bar(
         prepare_frames(
             recording,
@@ -200,13 +187,12 @@ def detect_recording(options: argparse.Namespace, detector: Detector) -> None:
     site = recording.name if sensors.geometry is None else sensors.geometry.name
     area = area_of_recording(frames, detector, site)
     backgrounds = [(sensor.mounted.label, sensor.background) for sensor in frames.sensors]
-    confidence = [background.confidence(name) for name, background in backgrounds]
-    for sentence in confidence:
-        runtime.LOG.info(sentence)
+    for name, background in backgrounds:
+        runtime.LOG.info(background.confidence(name))
     folder = options.output
     _resume(folder, key)
     with runtime.incomplete_if_interrupted(folder, continues=True):
-        results = runtime.finish_with_bar(_detected(options, frames, detector, area, labels))
+        results = runtime.finish_with_bar(_detected(options, frames, detector, area, labels, confidence))
     fullest = max(range(len(results)), key=lambda number: len(results[number].detected))
     scan = frames.frame(fullest)
     doubts = [sentence for name, background in backgrounds for sentence in background.warnings(name)]
@@ -218,8 +204,9 @@ def detect_recording(options: argparse.Namespace, detector: Detector) -> None:
     runtime.warn(doubts)
     pictures = [folder / "frames" / f"{number:06d}.png" for number in range(len(frames))]
     save_video(folder / "video.mp4", pictures, _rate(frames))
-    beside = _apart(results, sensors.geometry)
-    listed = _save_table(folder / "detections.csv", results, beside, sensors.geometry)
+    confident = [confidence.applied(one) for one in results]
+    beside = _apart(confident, sensors.geometry)
+    listed = _save_table(folder / "detections.csv", confident, beside, sensors.geometry)
     outcome = _evaluated(results, fullest, scan) if labels is not None else None
     record: dict[str, Any] = {
         "schema": RECORDING_SCHEMA,
@@ -242,7 +229,8 @@ def detect_recording(options: argparse.Namespace, detector: Detector) -> None:
             }
             for one in frames.sensors
         ],
-        "score": RECOMMENDED_SCORE,
+        "confidence": LEAST_CONFIDENCE,
+        "calibrated_on": list(confidence.recordings),
         "apart": int(sum(one.sum() for one in beside)),
         "detector": detector.description() | {"digest": digest(options.detector.read_bytes())},
         "warnings": doubts,
@@ -252,11 +240,13 @@ def detect_recording(options: argparse.Namespace, detector: Detector) -> None:
         save_charts(folder, outcome, site, frames.region, [one.mounted for one in frames.sensors])
         record["average_precision"] = {name: as_json(found) for name, found in outcome.precisions.items()}
         record["recall"] = {"score": outcome.score, "categories": outcome.recall}
-        record["listed"] = _listed(results, RECOMMENDED_SCORE)
+        record["listed"] = _listed(confident)
         print_precision(outcome)
         _print_listed(record["listed"])
     save_json(folder / RECORD, record)
-    runtime.print_line(f"{listed:,} road users with a score of {RECOMMENDED_SCORE:g} or more in {len(frames):,} frames")
+    runtime.print_line(
+        f"{listed:,} road users with a confidence of {LEAST_CONFIDENCE:g} or more in {len(frames):,} frames"
+    )
     if record["apart"]:
         ground = "off the scene's road" if sensors.geometry else "standing where no vehicle was seen to move"
         runtime.print_line(f"{record['apart']:,} of them are vehicles {ground}, often false: column apart")
@@ -269,6 +259,7 @@ def _detected(
     detector: Detector,
     area: DetectionArea,
     labels: Sequence[BoxLabels] | None,
+    confidence: Confidence,
 ) -> Generator[Progress, None, list[FrameResult]]:
     """Detect in each frame that an interrupted run has not done, write detections and picture, and return the results.
 
@@ -286,8 +277,12 @@ def _detected(
             with deterministic(os.cpu_count() or 1):
                 found = _inside(detect(detector, area, frame), frames)
         run = f"part {number * blocks // total + 1}" if blocks > 1 else "recording"
-        results.append(frame_result(frame, found, region=frames.region, sensors=places, run=run))
-        _save_frame(options, number, frame, found, frames, area.site)
+        result = frame_result(frame, found, region=frames.region, sensors=places, run=run)
+        path = options.output / "frames" / f"{number:06d}.png"
+        _save_picture(path, frame, confidence.applied(result).detected, frames, area.site)
+        # last, as they mark the frame as done
+        save_detections(options.output, number, found.boxes, result.detected.category.tolist(), found.score)
+        results.append(result)
     yield Progress(total, total, "detecting")
     return results
 
@@ -387,14 +382,13 @@ def _require_vehicle(labels: Sequence[BoxLabels] | None, region: BaseGeometry, f
         )
 
 
-def _key(options: argparse.Namespace, recording: Recording, detector: Detector) -> str:
+def _key(options: argparse.Namespace, recording: Recording, confidence: Confidence) -> str:
     """Return a digest of all that the detections follow from."""
     files = [path for record in recording.sensors for path in record.paths]
     sources = [path for path in (options.poses, options.site, *options.catalogue) if path is not None]
     return digest(
         source_digest("headless"),
-        detector.key,
-        repr((options.sensor, options.radius)),
+        repr((confidence, options.sensor, options.radius)),
         *(f"{path.name} {path.stat().st_size} {path.stat().st_mtime_ns}" for path in files),
         *(path.read_bytes() for path in sources),
     )
@@ -416,33 +410,25 @@ def _stored(folder: Path, number: int) -> Detections | None:
     path = folder / "openpcdet" / f"{number:06d}.txt"
     if not path.exists() or not (folder / "frames" / f"{number:06d}.png").exists():
         return None
-    boxes, names = read_labels(path)
-    scores = [float(line.split()[8]) for line in path.read_text(encoding="utf-8").splitlines()]
-    category = {name: CLASS_OF[category] for category, name in CLASSES.items()}
-    return Detections(boxes, np.array(scores), np.array([category[name] for name in names], dtype=np.int64))
+    return read_detections(path)
 
 
-def _save_frame(  # what was found where, and how it is shown
-    options: argparse.Namespace, number: int, frame: Frame, found: Detections, frames: RecordedFrames, site: str
-) -> None:
-    """Write the detections and the picture of a frame; the detections last, as they mark the frame as done."""
-    first = [members[0] for members in CLASS_CATEGORIES.values()]
-    categories = [first[category] for category in found.category.tolist()]
-    shown = found.score >= RECOMMENDED_SCORE
+def _save_picture(path: Path, frame: Frame, found: EvaluatedBoxes, frames: RecordedFrames, site: str) -> None:
+    """Write the picture of a frame with the listed ones of its detections, whose scores are their confidence."""
+    shown = found.score >= LEAST_CONFIDENCE
     west, south, east, north = frames.region.bounds
     picture = draw_birds_eye(
         frame.points,
         frame.foreground,
         (west, south, east, north),
         boxes=found.boxes[shown],
-        categories=[name for name, chosen in zip(categories, shown, strict=True) if chosen],
+        categories=found.category[shown].tolist(),
         sensors=np.array([sensor.mounted.xyz for sensor in frames.sensors]),
         region=frames.region,
         title=f"{site}, {frame.time:.1f} s",
     )
-    with whole_file(options.output / "frames" / f"{number:06d}.png") as temporary:
+    with whole_file(path) as temporary:
         picture.save(temporary, "PNG")
-    save_detections(options.output, number, found.boxes, categories, found.score)
 
 
 def _apart(results: Sequence[FrameResult], geometry: SceneGeometry | None) -> list[Boolean]:
@@ -450,18 +436,18 @@ def _apart(results: Sequence[FrameResult], geometry: SceneGeometry | None) -> li
 
     That is the road of the scene, and where vehicles were seen to move. None are if that cannot be seen.
     """
-    ground = moved_ground(results, RECOMMENDED_SCORE)
+    ground = moved_ground(results, LEAST_CONFIDENCE)
     if geometry is not None:
         ground = ground.union(outline(joined(geometry.roads)))
     elif ground.is_empty:
         return [np.zeros(len(one.detected.score), dtype=bool) for one in results]
-    return [apart(one.detected, ground) & (one.detected.score >= RECOMMENDED_SCORE) for one in results]
+    return [apart(one.detected, ground) & (one.detected.score >= LEAST_CONFIDENCE) for one in results]
 
 
 def _save_table(
     path: Path, results: Sequence[FrameResult], beside: Sequence[Boolean], geometry: SceneGeometry | None
 ) -> int:
-    """Write detections with the recommended score as CSV and return their number.
+    """Write the listed detections with their confidence as CSV and return their number.
 
     Latitude and longitude are columns only if the map has them.
     """
@@ -472,7 +458,7 @@ def _save_table(
     count = 0
     for number, result in enumerate(results):
         found = result.detected
-        kept = np.flatnonzero(found.score >= RECOMMENDED_SCORE)
+        kept = np.flatnonzero(found.score >= LEAST_CONFIDENCE)
         where = None
         if georeferenced and geometry is not None and len(kept):
             where = geometry.geo_reference.geographic(found.boxes[kept, :3] + geometry.origin)
@@ -499,14 +485,14 @@ def _rate(frames: RecordedFrames) -> float:
     return float(min(max(1.0 / max(np.median(np.diff(times)), 1e-3), 0.5), 30.0)) if len(times) > 1 else 1.0
 
 
-def _listed(results: Sequence[FrameResult], score: float) -> dict[str, float | int | None]:
-    """Return the false vehicles per frame with some score, and the share found of the vehicles with enough returns."""
+def _listed(results: Sequence[FrameResult]) -> dict[str, float | int | None]:
+    """Return the false vehicles per frame that are listed, and the share found of the vehicles with enough returns."""
     evaluation = evaluate(results, Rule(iou=_LISTED_OVERLAP))
-    false = ~evaluation.detections.hit & (evaluation.detections.score >= score)
+    false = ~evaluation.detections.hit & (evaluation.detections.score >= LEAST_CONFIDENCE)
     wanted = evaluation.wanted.points >= _LISTED_RETURNS
-    found = evaluation.wanted.score[wanted] >= score
+    found = evaluation.wanted.score[wanted] >= LEAST_CONFIDENCE
     return {
-        "score": score,
+        "confidence": LEAST_CONFIDENCE,
         "overlap": _LISTED_OVERLAP,
         "false_per_frame": float(false.sum()) / len(results),
         "fewest_returns": _LISTED_RETURNS,
@@ -517,7 +503,8 @@ def _listed(results: Sequence[FrameResult], score: float) -> dict[str, float | i
 
 def _print_listed(listed: Mapping[str, float | int | None]) -> None:
     runtime.print_line(
-        f"vehicles with a score of {listed['score']:g} or more: {listed['false_per_frame']:.2f} false ones per frame"
+        f"vehicles with a confidence of {listed['confidence']:g} or more: "
+        f"{listed['false_per_frame']:.2f} false ones per frame"
     )
     if listed["found"] is not None:
         runtime.print_line(

@@ -12,16 +12,17 @@ from headless.charts.error_view import ErrorView, save_error_view
 from headless.detection.average_precision import Evaluation, precision_recall
 from headless.detection.breakdown import DISTANCE_EDGES, POINT_EDGES, average_precision_by, recall_by
 from headless.detection.detector_evaluation import DetectorEvaluation
-from headless.detection.frame_results import FrameResult
+from headless.detection.frame_results import Detections, FrameResult
 from headless.detection.matching import NO_MATCH, Rule, match
 from headless.detection.rules import MAIN_RULE
+from headless.detection.settings import CLASS_OF
 
 import numpy as np
 from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
 from seip_addon.core.arrays import Float
-from seip_addon.core.output.datasets.formats import kitti_results, openpcdet_results
+from seip_addon.core.output.datasets.formats import CLASSES, kitti_results, openpcdet_results, read_labels
 from seip_addon.core.output.results.detection_record import FORMATS
 from seip_addon.core.sensing.scans.sensor import MountedSensor
 from seip_addon.core.storage.files import whole_file
@@ -113,6 +114,14 @@ def save_detections(folder: Path, number: int, boxes: Float, categories: Sequenc
     for form, lines in zip(FORMATS, (kitti_results, openpcdet_results), strict=True):
         with whole_file(folder / form / f"{number:06d}.txt") as temporary:
             temporary.write_text(lines(boxes, categories, score), encoding="utf-8")
+
+
+def read_detections(path: Path) -> Detections:
+    """Read the detections of a frame from their file in the format of OpenPCDet."""
+    boxes, names = read_labels(path)
+    scores = [float(line.split()[8]) for line in path.read_text(encoding="utf-8").splitlines()]
+    category = {name: CLASS_OF[category] for category, name in CLASSES.items()}
+    return Detections(boxes, np.array(scores), np.array([category[name] for name in names], dtype=np.int64))
 
 
 def remove_detections(folder: Path) -> None:

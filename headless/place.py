@@ -132,7 +132,7 @@ def main(argv: list[str]) -> None:
         if objective.scenarios.kind == "traffic":
             traffic.append(finish(read_runs(options.traffic or survey.runs_beside(options.scene), layout)))
 
-    surveyed, watch = survey.survey(options, check)
+    surveyed, watch = survey.survey(options, check, objective)
     runs = traffic[0] if traffic else None
     if runs is not None:
         runtime.LOG.info(runs.overlap)

@@ -48,7 +48,7 @@ REMOVED: dict[str, str] = {
     ),
     "--no-noise": "noise is part of a sensor's model; from Python, set it in the settings of a scan",
     **dict.fromkeys(("--rolling-shutter", "--no-rolling-shutter"), "traffic always moves while sensors turn"),
-    "--score": "detections.csv and the pictures show those with a score of 0.5 or more, kitti/ has all",
+    "--score": "detections.csv and the pictures show those with a confidence of 0.5 or more, kitti/ has all",
     "--begin": "use --start",
     "--end": "use --duration",
     **dict.fromkeys(("--turns", "--green"), "all simulations have the same shares of turns and the same signal plan"),

@@ -15,7 +15,7 @@ from headless import runtime
 from headless.options import new_parser
 
 from seip_addon.core.output.report.evidence import load_evidence
-from seip_addon.core.output.report.write import write_report
+from seip_addon.core.output.report.sections import write_report
 
 
 def main(argv: list[str]) -> None:

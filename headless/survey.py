@@ -18,7 +18,7 @@ import bpy
 import numpy as np
 
 from seip_addon.core.choosing.placement.deployment import Sensor
-from seip_addon.core.choosing.placement.objective import Solution
+from seip_addon.core.choosing.placement.objective import Objective, Solution
 from seip_addon.core.counts import counted
 from seip_addon.core.output.results.placement_record import Provenance
 from seip_addon.core.output.results.versions import versions
@@ -30,6 +30,7 @@ from seip_addon.core.site.candidates import CandidateSettings
 from seip_addon.core.site.installed_cost import DEFAULTS, load_installed_cost
 from seip_addon.core.site.site import Site
 from seip_addon.core.storage.folder_contents import check_no_run
+from seip_addon.core.workflows.early_answer import early_answer
 from seip_addon.core.workflows.records import record_of
 from seip_addon.core.workflows.survey import Layout, Survey, lay_out, see
 from seip_addon.core.workflows.survey_settings import SurveySettings
@@ -108,7 +109,9 @@ def scene_path(scene: Path | None) -> Path:
     return Path(bpy.data.filepath) if scene is None else scene
 
 
-def survey(options: argparse.Namespace, check: Callable[[Layout], None]) -> tuple[Survey, Stopwatch]:
+def survey(
+    options: argparse.Namespace, check: Callable[[Layout], None], objective: Objective | None = None
+) -> tuple[Survey, Stopwatch]:
     """Read the scene, lay out its site, and find or compute its visibility grid; return with it how long that took.
 
     Parameters
@@ -117,6 +120,8 @@ def survey(options: argparse.Namespace, check: Callable[[Layout], None]) -> tupl
         Options of a parser with `add_options`.
     check : callable
         Called before any ray is cast: refuses what cannot be had on the layout.
+    objective : Objective, optional
+        Objective of the placement that follows, for an early answer.
     """
     settings = read_survey_settings(options)
     settings.models()  # refuses unknown types before the scene is read
@@ -130,7 +135,11 @@ def survey(options: argparse.Namespace, check: Callable[[Layout], None]) -> tupl
     LOG.info(_describe_site(layout.site))
     runtime.warn(layout.warnings)
     check(layout)
-    surveyed = watch.run("visibility", see(layout, options.output / "visibility.npz", options.scheduler))
+    file = options.output / "visibility.npz"
+    if objective is not None:
+        best = watch.run("early answer", early_answer(layout, objective, file))
+        LOG.info("early answer from a few poses: %s", best or "none")
+    surveyed = watch.run("visibility", see(layout, file, options.scheduler))
     LOG.info(culling_message(surveyed.grid.parameters["triangles"]))
     return surveyed, watch
 

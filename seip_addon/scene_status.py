@@ -10,7 +10,7 @@ from dataclasses import replace
 import bpy
 
 from .core.errors import SeipError
-from .core.output.results.placement_file import parsed_record
+from .core.output.results.placement_record import parsed_record
 from .core.site.candidates import CandidateSettings
 from .core.workflows.survey_settings import SurveySettings
 from .scene import contract

@@ -17,8 +17,7 @@ import bpy
 
 from . import preferences
 from .core.errors import SeipError
-from .core.output.results.placement_file import parsed_record
-from .core.output.results.placement_record import PlacementRecord
+from .core.output.results.placement_record import PlacementRecord, parsed_record
 from .core.progress import Progress
 from .core.workflows.records import inputs_of, restored_solution
 from .core.workflows.survey import Survey, lay_out, see

@@ -7,8 +7,7 @@ import numpy as np
 
 from .core.arrays import Float
 from .core.errors import SeipError
-from .core.output.results.placement_file import parsed_record
-from .core.output.results.placement_record import RecordedSensor
+from .core.output.results.placement_record import RecordedSensor, parsed_record
 from .core.workflows.moved_sensors import BY_HAND
 from .scene import contract
 from .scene.sensors import labelled_sensors, pose_of

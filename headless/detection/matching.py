@@ -89,7 +89,9 @@ def match(frame: FrameResult, rule: Rule) -> Match:
     """Match the detections of a frame to its ground-truth boxes."""
     truth, detected = frame.truth, frame.detected
     counted = must_be_found(frame, rule)
-    overlap = np.where(of_its_kind(frame, rule)[:, None], overlaps(frame, rule), 0.0)
+    overlap = np.where(
+        of_its_kind(frame, rule)[:, None], overlaps(detected.boxes, truth.boxes, in_space=rule.in_space), 0.0
+    )
     best = overlap.max(axis=1, initial=0.0)
     found_by, found = np.full(len(truth), NO_MATCH), np.full(len(detected), NO_MATCH)
     # lexsort sorts by its last key first: by score, and equal scores by their best overlap. The loop cannot be
@@ -120,8 +122,8 @@ def of_its_kind(frame: FrameResult, rule: Rule) -> Boolean:
     return np.isin(frame.detected.category, rule.categories)
 
 
-def overlaps(frame: FrameResult, rule: Rule) -> Float:
-    """Return the intersection over union of each detection with each road user, (k, g) float64."""
-    detected, truth = torch.from_numpy(frame.detected.boxes), torch.from_numpy(frame.truth.boxes)
-    found = iou_matrix_3d(detected, truth) if rule.in_space else iou_matrix(in_plan(detected), in_plan(truth))
+def overlaps(boxes: Float, others: Float, *, in_space: bool = False) -> Float:
+    """Return the intersection over union of boxes (k, 7) with others (g, 7), in plan or in space, (k, g)."""
+    one, other = torch.from_numpy(boxes), torch.from_numpy(others)
+    found = iou_matrix_3d(one, other) if in_space else iou_matrix(in_plan(one), in_plan(other))
     return np.asarray(found.numpy(), dtype=np.float64)

@@ -160,15 +160,23 @@ def finish(steps: Generator[Progress, None, Result], report: Callable[[Progress]
                 report(progress)
 
 
+def altered(
+    steps: Generator[Progress, None, Result], alter: Callable[[Progress], Progress]
+) -> Generator[Progress, None, Result]:
+    """Run work, and yield what ``alter`` makes of its progress."""
+    with closing(steps):
+        while True:
+            try:
+                step = next(steps)
+            except StopIteration as stop:
+                result: Result = stop.value
+                return result
+            yield alter(step)
+
+
 def within(whole: Progress, steps: Generator[Progress, None, Result]) -> Generator[Progress, None, Result]:
     """Run work as one unit of a larger whole: each step yields the progress of the whole, with best value and gap."""
-    while True:
-        try:
-            step = next(steps)
-        except StopIteration as stop:
-            result: Result = stop.value
-            return result
-        yield replace(whole, best=step.best, gap=step.gap)
+    return altered(steps, lambda step: replace(whole, best=step.best, gap=step.gap))
 
 
 def in_thread(

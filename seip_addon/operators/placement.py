@@ -17,10 +17,11 @@ from ..core.errors import SeipError
 from ..core.output.results.answer import answer
 from ..core.progress import Progress
 from ..core.workflows.detection import DetectionJob
+from ..core.workflows.early_answer import after_early_answer, early_answer
 from ..core.workflows.finalists import check_judged, find_finalists, judge_elsewhere, judged_solution
 from ..core.workflows.placing import place, with_context
 from ..core.workflows.survey import Survey
-from ..core.workflows.traffic_runs import found_runs, read_runs
+from ..core.workflows.traffic_runs import TrafficRuns, found_runs, read_runs
 from ..properties.conversion import output_folder, runs_folder
 from ..scene.write import write_result
 from ..session import SceneState, session
@@ -144,6 +145,15 @@ def _placed(
     state = yield from surveying
     runs = None if folder is None else (yield from read_runs(found_runs(folder), state.layout))
     check_objective(state.layout.site, state.layout.models, objective)
+    grid_file = state.resources.grid_file(state.inputs["visibility"])
+    best = yield from early_answer(state.layout, objective, grid_file, state.resources.cores)
+    return (yield from after_early_answer(best, _searched(state, objective, runs, acceptance)))
+
+
+def _searched(
+    state: SceneState, objective: Objective, runs: TrafficRuns | None, acceptance: Acceptance
+) -> Generator[Progress, None, SceneState]:
+    """Compute visibility where it is not known, and search for the placement."""
     state, survey = yield from scene_survey.with_visibility(state)
     began = time.perf_counter()
     solution = yield from place(survey, objective, runs, acceptance)

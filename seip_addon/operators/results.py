@@ -18,12 +18,11 @@ from mathutils import Vector
 from .. import live_coverage, preferences, scene_status, scene_survey
 from ..core.choosing.placement.objective import Objective
 from ..core.errors import SeipError
-from ..core.output.report.write import write_report
+from ..core.output.pictures.colours import compare, packed_counts, unpacked_counts
+from ..core.output.report.sections import write_report
 from ..core.output.results.answer import answer, change_text
-from ..core.output.results.comparison import compare, packed_counts, unpacked_counts
 from ..core.output.results.file_names import REPORT_FILES
-from ..core.output.results.placement_file import load_placement, parsed_record
-from ..core.output.results.placement_record import PlacementRecord, Provenance
+from ..core.output.results.placement_record import PlacementRecord, Provenance, load_placement, parsed_record
 from ..core.output.results.versions import versions
 from ..core.progress import Progress
 from ..core.sensing.scans.sensor import MountedSensor

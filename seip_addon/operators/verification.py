@@ -12,7 +12,7 @@ import bpy
 from .. import live_coverage, preferences, scene_status
 from ..core.errors import SeipError
 from ..core.output.results.file_names import VERIFICATION_FOLDER, VERIFICATION_PICTURES
-from ..core.output.results.verification_text import summary
+from ..core.output.results.verification_record import summary
 from ..core.output.results.versions import versions
 from ..core.progress import Progress
 from ..core.sensing.recordings.recording import Recording, open_recording

@@ -166,8 +166,8 @@ def save_viewport_sheet(path: Path, scene: bpy.types.Scene, area: bpy.types.Area
 def _save_sheet(path: Path, state: SceneState, view: Any) -> None:  # noqa: ANN401  # PIL's image, not loaded yet
     from PIL import Image  # noqa: PLC0415  # as above
 
+    from ..core.output.pictures.labelled_view import save_sheet  # noqa: PLC0415  # as above
     from ..core.output.pictures.plan_view import save_plan_view  # noqa: PLC0415  # as above
-    from ..core.output.pictures.sheet import save_sheet  # noqa: PLC0415  # as above
 
     survey, solution = state.placed()
     with TemporaryDirectory(prefix="seip-") as folder:

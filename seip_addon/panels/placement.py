@@ -13,8 +13,7 @@ from ..core.choosing.placement.returns_summary import returns_text
 from ..core.choosing.placement.scenarios import DEFAULT_COUNTS
 from ..core.counts import counted, duration_text
 from ..core.output.results.answer import answer, sentence, status_text
-from ..core.output.results.placement_file import parsed_record
-from ..core.output.results.placement_record import PlacementRecord, relevant_warnings
+from ..core.output.results.placement_record import PlacementRecord, parsed_record, relevant_warnings
 from ..core.site.obstruction import NO_OBSTACLES_MESSAGE
 from ..core.workflows.traffic_runs import traffic_folder
 from ..operators.detection import no_python

@@ -6,10 +6,8 @@ import bpy
 
 from ..core.choosing.placement.returns_summary import SURFACE_SEEN, returns_text
 from ..core.errors import SeipError
-from ..core.output.pictures.coverage_colours import Aspect
-from ..core.output.results.comparison import BOTH, CLASS_WORDS, KEPT_ONLY, NEITHER, PRESENT_ONLY, compared_shares
-from ..core.output.results.placement_file import parsed_record
-from ..core.output.results.placement_record import PlacementRecord
+from ..core.output.pictures.colours import BOTH, CLASS_WORDS, KEPT_ONLY, NEITHER, PRESENT_ONLY, Aspect, compared_shares
+from ..core.output.results.placement_record import PlacementRecord, parsed_record
 from ..core.sensing.lidar.model import short_name
 from ..operators import results
 from ..operators.results import no_placement

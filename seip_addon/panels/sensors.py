@@ -7,7 +7,7 @@ import math
 import bpy
 
 from .. import sensor_types
-from ..core.output.results.placement_file import parsed_record
+from ..core.output.results.placement_record import parsed_record
 from ..core.sensing.lidar.model import LidarModel
 from ..core.sensing.returns.bodies import PANELS
 from ..core.sensing.visibility.ring_resolution import unresolved_from

@@ -7,7 +7,7 @@ from bpy.props import BoolProperty, CollectionProperty, EnumProperty, IntPropert
 
 from .. import last_scan, selection
 from ..core.errors import SeipError
-from ..core.output.results.placement_file import parsed_record
+from ..core.output.results.placement_record import parsed_record
 from ..scene import contract
 from ..scene_status import FILE_VERSION
 from ..viewport import coverage

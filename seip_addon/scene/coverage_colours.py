@@ -7,7 +7,7 @@ import numpy as np
 
 from ..core.arrays import Float, Integer
 from ..core.errors import SeipError
-from ..core.output.pictures.coverage_colours import Aspect, Colouring, as_placed, colouring
+from ..core.output.pictures.colours import Aspect, Colouring, as_placed, colouring
 from .write import ASPECT, RETURNS, SEEN_BY, TARGET_WEIGHT, aspects_of, coverage_of, paint
 
 

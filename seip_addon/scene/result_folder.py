@@ -13,18 +13,14 @@ from ..core.choosing.placement.deployment import Deployment
 from ..core.choosing.placement.objective import Solution, placement_constraints
 from ..core.errors import SeipError
 from ..core.output.pictures.close_ups import save_close_ups
-from ..core.output.pictures.coverage_colours import Legend
+from ..core.output.pictures.colours import Legend, packed_counts
 from ..core.output.pictures.labelled_view import save_labelled_view
 from ..core.output.pictures.plan_view import save_plan_view
 from ..core.output.results.candidate_table import save_candidate_table
 from ..core.output.results.carla import save_carla_spawns
-from ..core.output.results.comparison import packed_counts
 from ..core.output.results.file_names import REPORT_FILES
-from ..core.output.results.geojson import save_geojson
-from ..core.output.results.kml import save_kml
-from ..core.output.results.located import LOCATED_FILES, located
-from ..core.output.results.placement_file import save_placement
-from ..core.output.results.placement_record import PlacementRecord
+from ..core.output.results.geographic_files import LOCATED_FILES, located, save_geojson, save_kml
+from ..core.output.results.placement_record import PlacementRecord, save_placement
 from ..core.output.results.site_file import save_site_file
 from ..core.progress import Progress
 from ..core.site.site import Site

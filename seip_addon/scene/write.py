@@ -10,7 +10,7 @@ import numpy as np
 
 from ..core.choosing.placement.deployment import Deployment, Sensor
 from ..core.geometry.solids import Solid, join, prism, tube
-from ..core.output.pictures.coverage_colours import Aspect, Colouring, Legend, colouring
+from ..core.output.pictures.colours import Aspect, Colouring, Legend, colouring
 from ..core.site.roles import AREA_OVERLAYS
 from ..core.site.site import Site, Targets
 from ..core.site.target_squares import target_squares

@@ -6,7 +6,7 @@ import numpy as np
 from mathutils import Matrix, Vector
 
 from ..core.arrays import Float
-from ..core.output.pictures.callouts import stack_upwards
+from ..core.output.pictures.labels import stack_upwards
 from ..overlay import Label
 from ..scene import contract
 from ..scene.sensors import placed_sensors

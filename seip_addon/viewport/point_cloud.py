@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..core.output.pictures.cloud_colours import By, cloud_colours, sensor_colour, strength_ramp
+from ..core.output.pictures.colours import By, cloud_colours, sensor_colour, strength_ramp
 from ..core.output.pictures.palette import MAX_INTENSITY, STATIC_COLOUR, rgb
 from ..core.sensing.scans.frame import Frame
 from ..core.sensing.scans.sensor import MountedSensor

@@ -13,9 +13,9 @@ import pytest
 
 from seip_addon import live_coverage, scene_status
 from seip_addon.core.choosing.placement.objective import MOVED, MOVED_MESSAGE, Objective
+from seip_addon.core.output.pictures.colours import unpacked_counts
 from seip_addon.core.output.results.answer import status_text
-from seip_addon.core.output.results.comparison import unpacked_counts
-from seip_addon.core.output.results.placement_file import comparable, load_placement, parsed_record
+from seip_addon.core.output.results.placement_record import comparable, load_placement, parsed_record
 from seip_addon.panels import placement, results, sensors
 from seip_addon.scene import result_folder
 from seip_addon.scene.blend_file import save_blend

@@ -13,7 +13,7 @@ import pytest
 
 from seip_addon import scene_status, sensor_types
 from seip_addon.core.choosing.placement.scenarios import DEFAULT_COUNTS
-from seip_addon.core.output.results.placement_file import comparable, load_placement, parsed_record
+from seip_addon.core.output.results.placement_record import comparable, load_placement, parsed_record
 from seip_addon.core.progress import Progress, finish
 from seip_addon.core.sensing.visibility.grid import VisibilityGrid
 from seip_addon.core.sensing.visibility.ray_casting import BvhRayCaster, EmbreeRayCaster

@@ -6,8 +6,8 @@ import pytest
 
 from seip_addon import live_coverage
 from seip_addon.core.choosing.placement.returns_summary import returns_text
-from seip_addon.core.output.results.comparison import unpacked_counts
-from seip_addon.core.output.results.placement_file import parsed_record
+from seip_addon.core.output.pictures.colours import unpacked_counts
+from seip_addon.core.output.results.placement_record import parsed_record
 from seip_addon.panels import results as results_panel
 from seip_addon.scene.sensors import placed_sensors
 from seip_addon.session import session

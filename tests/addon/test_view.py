@@ -6,8 +6,8 @@ import pytest
 from PIL import Image
 
 import seip_addon
+from seip_addon.core.output.pictures.labelled_view import GAP
 from seip_addon.core.output.pictures.plan_view import DPI, MAP_WIDTH, MARGIN
-from seip_addon.core.output.pictures.sheet import GAP
 from seip_addon.operators import view
 from seip_addon.scene.sensors import placed_sensors
 from seip_addon.session import session

@@ -12,7 +12,7 @@ from seip_addon.background import Background
 from seip_addon.core.acceptance import Acceptance
 from seip_addon.core.choosing.placement.search_limits import SolverLimits
 from seip_addon.core.output.results.answer import sentence
-from seip_addon.core.output.results.placement_file import parsed_record
+from seip_addon.core.output.results.placement_record import parsed_record
 from seip_addon.core.progress import Progress
 from seip_addon.operators import base, results
 from seip_addon.panels import missing_package

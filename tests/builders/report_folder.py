@@ -24,8 +24,7 @@ from seip_addon.core.choosing.placement.solver import front_of
 from seip_addon.core.geometry.geo_reference import GeoReference
 from seip_addon.core.output.pictures.close_ups import save_close_ups
 from seip_addon.core.output.pictures.plan_view import save_plan_view
-from seip_addon.core.output.results.placement_file import save_placement
-from seip_addon.core.output.results.placement_record import Provenance, placement_record
+from seip_addon.core.output.results.placement_record import Provenance, placement_record, save_placement
 from seip_addon.core.output.results.site_file import save_site_file
 from seip_addon.core.progress import finish
 from seip_addon.core.sensing.visibility.grid import VisibilityGrid

@@ -7,7 +7,7 @@ from pathlib import Path
 from PIL import Image
 
 from seip_addon.core.output.results.file_names import VERIFICATION_FILE, VERIFICATION_FOLDER, VERIFICATION_PICTURES
-from seip_addon.core.output.results.placement_file import load_placement
+from seip_addon.core.output.results.placement_record import load_placement
 from seip_addon.core.output.results.verification_record import (
     SCHEMA,
     RecordedChange,

@@ -12,11 +12,15 @@ pytest.importorskip("torch", reason="torch is not installed: make detection")
 pytest.importorskip("bpy")
 
 from headless import detect, detect_recording
+from headless.detection.confidence import Confidence
+from headless.detection.detector import SHIPPED_DETECTOR, Detector
+from headless.detection.settings import CLASS_CATEGORIES
 
 from PIL import Image
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.geometry.geo_reference import GeoReference
+from seip_addon.core.output.datasets.formats import CLASSES
 from tests.builders.scanned_street import ground_mesh, mounted, street_meshes, street_record, surface_of
 
 SENSOR = mounted("os1_32_rev7", (-16.0, -14.0, 4.5))
@@ -92,24 +96,40 @@ def test_detections_pictures_video_and_figures_are_written(results):
     assert any("6 sweeps over 2 s are few" in sentence for sentence in record["warnings"])
 
 
-def test_the_table_lists_each_detection_with_its_score_time_and_box(results):
+def test_the_table_lists_each_detection_with_its_confidence_time_and_box(results):
     with (results / "detections.csv").open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
     assert list(rows[0]) == [
-        *("frame", "time_s", "category", "score", "x_m", "y_m", "z_m", "length_m", "width_m", "height_m", "yaw_deg"),
+        *(
+            "frame",
+            "time_s",
+            "category",
+            "confidence",
+            "x_m",
+            "y_m",
+            "z_m",
+            "length_m",
+            "width_m",
+            "height_m",
+            "yaw_deg",
+        ),
         "apart",
     ]
+    known = Confidence.of_detector(SHIPPED_DETECTOR, Detector.load(SHIPPED_DETECTOR))
+    assert known.recordings
+    class_of = {CLASSES[one]: name for name, group in CLASS_CATEGORIES.items() for one in group}
     expected = []
     for number in range(SWEEPS):
         lines = (results / "openpcdet" / f"{number:06d}.txt").read_text(encoding="utf-8").splitlines()
         for line in lines:
-            *box, _, score = line.split()
-            if float(score) >= 0.5:
-                expected.append((number, number / 2, float(score), *map(float, box)))
+            *box, name, score = line.split()
+            (sure,) = known.of_class(class_of[name], np.array([float(score)]))
+            if sure >= 0.5:
+                expected.append((number, number / 2, sure, *map(float, box)))
     assert len(rows) == len(expected) >= SWEEPS
-    for row, (number, time, score, x, y, z, length, width, height, yaw) in zip(rows, expected, strict=True):
+    for row, (number, time, sure, x, y, z, length, width, height, yaw) in zip(rows, expected, strict=True):
         assert (int(row["frame"]), float(row["time_s"])) == (number, time)
-        assert float(row["score"]) == pytest.approx(score, abs=6e-4)
+        assert float(row["confidence"]) == pytest.approx(sure, abs=6e-4)
         sizes = [float(row[name]) for name in ("x_m", "y_m", "z_m", "length_m", "width_m", "height_m")]
         assert sizes == pytest.approx([x, y, z, length, width, height], abs=6e-4)
         assert float(row["yaw_deg"]) == pytest.approx(math.degrees(yaw), abs=0.06)
@@ -145,7 +165,7 @@ def test_labels_give_average_precision(results):
     assert inside - 1 <= found["road_users"] <= inside
     assert found["average_precision"] > 0.3
     listed = record["listed"]
-    assert (listed["score"], listed["fewest_returns"]) == (0.5, 10)
+    assert (listed["confidence"], listed["fewest_returns"]) == (0.5, 10)
     assert 0 < listed["road_users"] <= found["road_users"]
     assert listed["found"] > 0.7
     with (results / "detections.csv").open(encoding="utf-8", newline="") as file:
@@ -157,22 +177,22 @@ def test_labels_give_average_precision(results):
 
 
 def test_an_interrupted_run_goes_on_and_gives_the_same_bytes(folder, results, tmp_path, monkeypatch):
-    save, detected = detect_recording._save_frame, []  # noqa: SLF001  # where a run may stop
+    save, detected = detect_recording._save_picture, []  # noqa: SLF001  # where a run may stop
 
-    def stop(options, number, *others):
-        if number == 3:
+    def stop(path, *others):
+        if path.stem == "000003":
             raise KeyboardInterrupt
-        save(options, number, *others)
+        save(path, *others)
 
     run = detect_recording.detect
     monkeypatch.setattr(detect_recording, "detect", lambda *given: detected.append(given) or run(*given))
-    monkeypatch.setattr(detect_recording, "_save_frame", stop)
+    monkeypatch.setattr(detect_recording, "_save_picture", stop)
     named = arguments(folder, tmp_path / "out", "--labels", str(folder / "labels"))
     with pytest.raises(KeyboardInterrupt, match="are incomplete; the same command continues from there"):
         detect.main(named)
     assert len(detected) == 4
     assert json.loads((tmp_path / "out" / "detection.json").read_text(encoding="utf-8"))["complete"] is False
-    monkeypatch.setattr(detect_recording, "_save_frame", save)
+    monkeypatch.setattr(detect_recording, "_save_picture", save)
     detect.main(named)
     assert len(detected) == 4 + SWEEPS - 3
     assert files(tmp_path / "out") == files(results)

@@ -11,7 +11,7 @@ from headless import place
 import bpy
 
 import seip_addon
-from seip_addon.core.output.results.placement_file import comparable, load_placement, parsed_record
+from seip_addon.core.output.results.placement_record import comparable, load_placement, parsed_record
 from seip_addon.core.workflows import finalists
 from seip_addon.panels import placement
 

@@ -21,8 +21,7 @@ import numpy as np
 
 from seip_addon.core.choosing.placement.judgement import MEAN
 from seip_addon.core.errors import SeipError
-from seip_addon.core.output.results.placement_file import load_placement
-from seip_addon.core.output.results.placement_record import recorded_sensor
+from seip_addon.core.output.results.placement_record import load_placement, recorded_sensor
 from seip_addon.core.progress import Progress, finish
 from seip_addon.core.sensing.lidar.catalogue import find_models, load_catalogue
 from seip_addon.core.sensing.weather import Weather

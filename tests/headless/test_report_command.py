@@ -14,7 +14,7 @@ import bpy
 import pytest
 
 from seip_addon.core.output.report.repeat import repeating_command
-from seip_addon.core.output.results.placement_file import load_placement
+from seip_addon.core.output.results.placement_record import load_placement
 from seip_addon.core.storage.json_dataclass import as_json
 from seip_addon.scene import contract
 from seip_addon.scene.blend_file import open_blend, save_blend

@@ -140,7 +140,7 @@ def test_the_report_imports_no_solver():
         name = left.pop()
         reached.add(name)
         left += found[name] - reached
-    assert "seip_addon.core.output.report.write" in reached
+    assert "seip_addon.core.output.report.sections" in reached
     assert not [name for name in reached if name.endswith((".solver", ".bounds", ".visibility.grid"))]
 
 

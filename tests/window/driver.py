@@ -9,7 +9,6 @@ there.
 from __future__ import annotations
 
 import os
-import shutil
 import subprocess
 import sys
 import tempfile
@@ -186,7 +185,8 @@ class Window:
 
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "window.png"
-            subprocess.run(["import", "-window", "root", str(path)], check=True)  # noqa: S603, S607  # as in `picture`
+            # ImageMagick's, of the screen: Blender's own pictures are black where OpenGL is drawn in software
+            subprocess.run(["import", "-window", "root", str(path)], check=True)  # noqa: S603, S607
             with Image.open(path) as shot:
                 return np.asarray(shot.convert("RGB"))
 
@@ -228,14 +228,7 @@ class Window:
         self.event("MOUSEMOVE", "NOTHING", self.middle)  # no tooltip, no button lit
         self.area.tag_redraw()
         yield 1.0
-        path = self.pictures / f"{name}.png"
-        path.parent.mkdir(parents=True, exist_ok=True)
-        if shutil.which("import"):  # of X: Blender's own pictures are black where OpenGL is drawn in software
-            shot = ["import", "-window", "root", "-resize", "1200x", "-colors", "255", f"PNG8:{path}"]
-            subprocess.run(shot, check=True)  # noqa: S603  # ImageMagick's, and our own path
-        else:
-            with bpy.context.temp_override(window=self.window):
-                bpy.ops.screen.screenshot(filepath=str(path))
+        yield from self.shot(name)
 
     def _scroll(self, pages: int) -> Steps:
         """Scroll the sidebar: not by the wheel, which scrolls a list where the mouse is over one."""

@@ -2,7 +2,7 @@
 
 import os
 
-from seip_addon.core.output.results.headings import tilt_degrees
+from seip_addon.core.geometry.orientation import tilt_degrees
 from seip_addon.core.storage.csv_table import save_csv
 
 from .cells import Case, CoverageStudy, EmptyCell

@@ -22,7 +22,6 @@ from matplotlib.ticker import FuncFormatter, NullFormatter
 
 from seip_addon.core.arrays import Float
 from seip_addon.core.estimates import Interval
-from seip_addon.core.output.pictures.callouts import place_callouts
 from seip_addon.core.output.pictures.chart_style import (
     DASHED,
     FAINT_COLOUR,
@@ -33,6 +32,7 @@ from seip_addon.core.output.pictures.chart_style import (
     style_axes,
 )
 from seip_addon.core.output.pictures.drawing import save_png
+from seip_addon.core.output.pictures.labels import place_callouts
 from seip_addon.core.output.pictures.palette import INK, PAPER, SOFT_INK
 
 LABEL: dict[str, Any] = {"size": 8.0, "color": INK, "ha": "center", "va": "center", "zorder": 5, "parse_math": False}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import shapely
@@ -244,6 +244,11 @@ class Candidates:
     def orientation(self, pose: int) -> Float:
         """Return the rotation (3, 3) float64 from the axes of a pose's sensor to those of the site."""
         return orientation(float(self.yaw[pose]), float(self.tilt[pose]))
+
+    def only(self, poses: Integer) -> Candidates:
+        """Return the candidates with some poses (k,), in that order, and with all positions."""
+        of_poses = ("position_of", "sensor", "height", "xyz", "yaw", "tilt")
+        return replace(self, **{name: getattr(self, name)[poses] for name in of_poses})
 
 
 def generate_candidates(geometry: SceneGeometry, settings: CandidateSettings, most: float = math.inf) -> Candidates:

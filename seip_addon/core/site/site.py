@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
@@ -14,13 +15,15 @@ from ..errors import SeipError
 from ..geometry.geo_reference import GeoReference
 from .candidates import Candidates, CandidateSettings, generate_candidates
 from .far_objects import without_far_objects
-from .scene_geometry import SceneGeometry, joined, ordered_surfaces
+from .scene_geometry import FROM_EXTRACT, HEIGHTS_FROM, SceneGeometry, joined, ordered_surfaces
 from .sources import SourceCount
 from .targets import Targets, generate_targets
 from .yaws import with_yaws
 
 __all__ = ["Candidates", "Site", "Targets", "make_site"]
 
+ROAD_KIND = "Driving lanes"
+LEVEL = 0.5  # metres between the road at the origin and zero in a model without heights
 MOST_PAIRS = 10**9
 """Largest number of candidates times targets: a byte of memory for each, and several times that in a search."""
 
@@ -69,6 +72,20 @@ class Site:
         None if the map's projection is not known.
         """
         return self.geo_reference.geographic(points + self.origin)
+
+    @property
+    def altitude_zero(self) -> str:
+        """Level that altitudes count from, in words, as far as the scene knows it."""
+        file = next((note.removeprefix(HEIGHTS_FROM) for note in self.assumptions if note.startswith(HEIGHTS_FROM)), "")
+        if file:
+            return f"the zero of the heights in {file.rpartition(' to ')[0].rpartition(', ')[0]}"
+        from_extract = any(row.source == FROM_EXTRACT and row.kind == ROAD_KIND for row in self.sources)
+        if from_extract and abs(self.origin[2]) < LEVEL:
+            return "the ground of the model, which is level, as the extract has no heights above the sea"
+        geoid = re.search(r"\+geoidgrids=(\S+)", self.geo_reference.projection)
+        return (
+            f"the zero of the map's heights{f' (geoid {geoid[1]})' if geoid else ', whose level the map does not give'}"
+        )
 
 
 def make_site(

@@ -68,8 +68,7 @@ def with_yaws(
         looks[own] = seen[position[own], turn[own]]
     if not looks.any():
         raise SeipError(f"no candidate is left ({len(pose)} {NOTHING_BEFORE}): use more yaws, or a wider field of view")
-    turned = {name: getattr(candidates, name)[pose[looks]] for name in ("sensor", "height", "xyz", "tilt")}
-    left = replace(candidates, **turned, position_of=position[looks], yaw=yaw[looks])
+    left = replace(candidates.only(pose[looks]), yaw=yaw[looks])
     dropped = {NOTHING_BEFORE: int((~looks).sum())} if not looks.all() else {}
     return _without_empty_positions(replace(left, dropped=candidates.dropped | dropped))
 

@@ -58,8 +58,8 @@ def from_json(kind: type[Value], content: object, where: str = "") -> Value:
     return read
 
 
-def read_record(kind: type[Value], text: str | bytes, schema: str, name: str, cure: str) -> Value:
-    """Return a dataclass from the text of a JSON object whose ``schema`` is given.
+def read_record(kind: type[Value], text: str | bytes, schemas: tuple[str, ...], name: str, cure: str) -> Value:
+    """Return a dataclass from the text of a JSON object with one of ``schemas``, of which the first is the present one.
 
     Parameters
     ----------
@@ -75,11 +75,11 @@ def read_record(kind: type[Value], text: str | bytes, schema: str, name: str, cu
         content = parse_json(text)
         json.dumps(content, ensure_ascii=False, allow_nan=False).encode()  # refuses what cannot be written again
         found = content.get("schema") if isinstance(content, dict) else None
-        if found == schema:
+        if found in schemas:
             return from_json(kind, content)
     except (SeipError, ValueError, RecursionError) as error:
         raise SeipError(f"{name} is damaged: {error}; {cure}") from error
-    raise SeipError(f"{name} has the schema {found!r}, not {schema!r}: {cure}, with one version of SEIP")
+    raise SeipError(f"{name} has the schema {found!r}, not {schemas[0]!r}: {cure}, with one version of SEIP")
 
 
 def as_json(value: object) -> Any:  # noqa: ANN401 -- values of any kind

@@ -134,7 +134,7 @@ def judged_solution(survey: Survey, solution: Solution, judgement: Judgement) ->
     if before is None:
         winner = replace(solution, placement=placement, greedy=None, deployment=survey.deploy(chosen))
     else:
-        winner = replace(returns.solution(placement, None), front=solution.front)
+        winner = replace(returns.solution(survey, placement, None), front=solution.front)
         summary = replace(winner.deployment.returns or before, front=before.front)
         winner = replace(winner, deployment=replace(winner.deployment, returns=summary))
     deployment = yield from with_gain_band(surroundings(survey), winner.deployment)

@@ -14,9 +14,8 @@ from ..choosing.placement.objective import MOVED, Objective, Solution, criterion
 from ..choosing.placement.problem import Placement
 from ..choosing.robustness.gain_band import with_gain_band
 from ..errors import SeipError
-from ..geometry.orientation import angles_of
+from ..geometry.orientation import angles_of, degrees, tilt_degrees
 from ..geometry.plan import surface_height
-from ..output.results.headings import degrees, tilt_degrees
 from ..progress import Progress
 from ..sensing.scans.sensor import MountedSensor
 from ..sensing.visibility.sight_lines import pose_at

@@ -94,7 +94,7 @@ def taken_solution(survey: Survey, objective: Objective, taken: SolvedBudget) ->
         notes=("the money at this site is its share of the budget of a network",),
     )
     if of_returns:
-        return (yield from survey_returns(survey, objective, threads=1)).solution(placement, None)
+        return (yield from survey_returns(survey, objective, threads=1)).solution(survey, placement, None)
     return Solution(objective, placement, None, deploy(survey.site, survey.models, rows, chosen))
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from ..choosing.placement.deployment import pose_prices
 from ..choosing.placement.objective import MOVED, Solution
 from ..errors import SeipError
-from ..output.results.located import LOCATED_FILES, missing_sentence
+from ..output.results.geographic_files import LOCATED_FILES, missing_sentence
 from ..output.results.placement_record import PlacementRecord, Provenance, placement_record
 from ..progress import Progress
 from ..sensing.lidar.catalogue import find_models, load_catalogue

@@ -42,7 +42,7 @@ at two sites, 47 and 74 % of the pedestrians in the region were there (docs/dete
 
 @dataclass(frozen=True, eq=False)
 class SurveyReturns:
-    """Expected returns from the road users of a survey, as an objective weights them.
+    """Expected returns from the road users of a site, as an objective weights them.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ class SurveyReturns:
         Returns in plain view.
     """
 
-    survey: Survey
+    layout: Layout
     objective: Objective
     users: RoadUsers
     grid: ReturnsGrid
@@ -62,12 +62,12 @@ class SurveyReturns:
 
     def in_traffic(self, poses: Integer | slice = slice(None)) -> NDArray[np.float32]:
         """Return what is left of the returns from poses by traffic that hides road users, (k, m) float32."""
-        origins = self.survey.site.candidates.xyz[poses]
+        origins = self.layout.site.candidates.xyz[poses]
         return returns_in_traffic(self.grid.returns[poses], origins, self.users)
 
     def problem(self) -> PlacementProblem:
         """State the objective as a problem whose value is the mean of ln(1 + returns in traffic)."""
-        constraints = vars(placement_constraints(self.survey.site, self.survey.models, self.objective))
+        constraints = vars(placement_constraints(self.layout.site, self.layout.models, self.objective))
         weights = self.weights
         return PlacementProblem(
             **{**constraints, "weights": weights / math.fsum(weights)}, amounts=self.in_traffic(), g=LOG_RETURNS
@@ -76,12 +76,16 @@ class SurveyReturns:
     def summary(self, chosen: Integer) -> ReturnsSummary:
         """Return the summary of the returns of chosen poses."""
         return summary_of(
-            self.grid.returns[chosen], self.survey.site.candidates.xyz[chosen], self.users, self.objective
+            self.grid.returns[chosen], self.layout.site.candidates.xyz[chosen], self.users, self.objective
         )
 
-    def solution(self, placement: Placement, greedy: Placement | None) -> Solution:
-        """Return the solution of a placement that was chosen for returns."""
-        survey, chosen = self.survey, placement.chosen
+    def describe(self, chosen: Integer, value: float) -> str:
+        """Return a placement's value, and its returns from road users of each kind, in words."""
+        return f"{math.expm1(value):.4g} returns, {self.summary(chosen).describe_each()}"
+
+    def solution(self, survey: Survey, placement: Placement, greedy: Placement | None) -> Solution:
+        """Return the solution of a placement on the survey of this layout that was chosen for returns."""
+        chosen = placement.chosen
         summary = self.summary(chosen)
         note = f"{CHOSEN_FOR}for returns from road users: {summary.describe()} in one revolution (geometric means)"
         pedestrians = _near_targets(survey.site.targets, self.users, self.grid.returns[chosen])
@@ -169,11 +173,8 @@ def place_by_returns(survey: Survey, objective: Objective, limits: SolverLimits)
     returns = yield from survey_returns(survey, objective)
     problem = returns.problem()
 
-    def describe(chosen: Integer, value: float) -> str:
-        return f"{math.expm1(value):.4g} returns, {returns.summary(chosen).describe_each()}"
-
-    placement = yield from solve(problem, limits, describe=describe)
-    return returns.solution(placement, solve_greedy(problem))
+    placement = yield from solve(problem, limits, describe=returns.describe)
+    return returns.solution(survey, placement, solve_greedy(problem))
 
 
 def crossing_returns(survey: Survey, solution: Solution) -> tuple[CrossingReturns, ...]:

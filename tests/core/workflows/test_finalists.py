@@ -11,8 +11,7 @@ from seip_addon.core.choosing.placement.objective import Objective, placement_pr
 from seip_addon.core.choosing.placement.scenarios import Scenarios
 from seip_addon.core.errors import SeipError
 from seip_addon.core.output.results.answer import answer, change_text
-from seip_addon.core.output.results.placement_file import parsed_record
-from seip_addon.core.output.results.placement_record import Provenance
+from seip_addon.core.output.results.placement_record import Provenance, parsed_record
 from seip_addon.core.progress import finish
 from seip_addon.core.workflows.finalists import (
     MOVED_BY,

@@ -9,8 +9,7 @@ import shapely
 
 from seip_addon.core.choosing.placement.objective import Objective
 from seip_addon.core.errors import SeipError
-from seip_addon.core.output.results.placement_file import load_placement, save_placement
-from seip_addon.core.output.results.placement_record import Provenance
+from seip_addon.core.output.results.placement_record import Provenance, load_placement, save_placement
 from seip_addon.core.progress import finish
 from seip_addon.core.site.scene_geometry import NamedArea
 from seip_addon.core.workflows.placing import place, with_context

@@ -2,15 +2,15 @@
 
 import hashlib
 from collections import Counter
-from collections.abc import Generator, Iterable, Mapping
+from collections.abc import Callable, Generator, Iterable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, Literal
 
 from ...errors import SeipError
 from ...progress import Progress
 from ...sensing.scans.frame import Frame
-from ...sensing.scans.sensor import MountedSensor
 from ...storage.files import digest, parse_json, save_json, whole_file
 from ...storage.json_dataclass import from_json
 from ..results.versions import versions
@@ -59,48 +59,41 @@ class _StoredDataset:
 def write_dataset(
     kind: Format, frames: Iterable[tuple[str, Frame]], run: TrafficRun, folder: str | Path, *, min_points: int = 1
 ) -> Generator[Progress, None, Record]:
-    """Write a traffic run into a dataset; further runs, of the same split or of another, are appended by further calls.
+    """Write a traffic run into a dataset, and return its entry in the manifest; further calls append further runs.
 
-    Of each frame those labels are written that lie inside the region, have a class in the format, and
-    ``min_points`` returns of all sensors together or more; the manifest counts the others by reason. The same frames
-    give the same bytes. Stopped and called again with the same run it goes on: files that are there are kept.
+    Labels are written that lie inside the region, have a class in the format, and ``min_points`` returns of all sensors
+    together or more; the manifest counts the others by reason. The same frames give the same bytes. An interrupted call
+    is resumed by the same call: existing files are kept.
 
     Parameters
     ----------
     frames : iterable of (str, Frame)
         The run's frames with their ids, in order of time.
     folder : path-like
-        Of the dataset: new, empty, or with other runs in the same format.
+        Folder of the dataset: new, empty, or with other runs in the same format.
     min_points : int
         1 leaves out what no sensor sees, which no detector can learn; 0 writes that as well.
-
-    Yields
-    ------
-    Progress
-        After each frame.
-
-    Returns
-    -------
-    dict
-        What the manifest says of the run.
 
     Raises
     ------
     SeipError
-        The folder cannot be written, or holds something that this run cannot be added to; the format cannot be
-        written here.
+        The folder cannot be written or belongs to something else, or the format cannot represent the run.
     """
     folder = Path(folder)
     manifest = _manifest_of(folder, kind, min_points)
     entry = _entry_of(manifest, run, kind, folder)
-    if entry["finished"] and _all_there(folder, manifest, entry):
+    paths = [*manifest["files"], *(path for sample in entry["samples"] for path in sample["files"])]
+    if entry["finished"] and all((folder / path).is_file() for path in paths):
         return entry
     entry.update(finished=False, samples=[], labels=dict.fromkeys(OUTCOMES, 0) if kind.classes else {}, classes={})
     save_json(folder / MANIFEST, manifest)
     for done, (frame_id, frame) in enumerate(frames):
         _check(frame_id, frame, run, entry["samples"])
         sample = make_sample((entry["first"] + done, frame_id), run, frame, kind.classes, min_points)
-        _count(entry, sample)
+        fates = Counter(sample.fates)
+        entry["labels"] = {word: count + fates[word] for word, count in entry["labels"].items()}
+        for name, count in sorted(Counter(sample.classes).items()):
+            entry["classes"][name] = entry["classes"].get(name, 0) + count
         entry["samples"].append(_written(folder, kind, sample))
         yield Progress(done + 1, 0, f"writing {kind.name}")
     if not entry["samples"]:
@@ -110,19 +103,13 @@ def write_dataset(
     for each in manifest["runs"]:
         splits[each["split"]] += [sample["name"] for sample in each["samples"]]
     index = kind.index_files(folder, splits)
-    manifest["files"] = {path: _write(folder / path, content) for path, content in index.items()}
+    manifest["files"] = {path: _write(folder / path, partial(bytes, content)) for path, content in index.items()}
     save_json(folder / MANIFEST, manifest)
     return entry
 
 
 def load_manifest(folder: str | Path) -> Record:
-    """Return what a dataset's manifest says.
-
-    Raises
-    ------
-    SeipError
-        There is none, or it is damaged or of another version.
-    """
+    """Return the manifest of a dataset; raise `SeipError` if there is none, or it is damaged or of another version."""
     path = Path(folder) / MANIFEST
     try:
         manifest = parse_json(path.read_bytes())
@@ -189,10 +176,12 @@ def _entry_of(manifest: Record, run: TrafficRun, kind: Format, folder: Path) -> 
 
 
 def _new_entry(run: TrafficRun, kind: Format) -> Record:
-    sensors = [_sensor_record(sensor, run) for sensor in run.sensors]
-    parts = [
-        part for sensor in run.sensors for part in (sensor.label, sensor.model.name, sensor.xyz, sensor.orientation)
-    ]
+    sensors = []
+    for one in run.sensors:
+        places = {"local_m": one.xyz.tolist(), "map_m": (one.xyz + run.origin).tolist()}
+        pose = {**places, "orientation": one.orientation.tolist()}
+        sensors.append({"label": one.label, "model": one.model.name, **pose})
+    parts = (part for one in run.sensors for part in (one.label, one.model.name, one.xyz, one.orientation))
     return {
         "name": run.name,
         "split": run.split,
@@ -211,21 +200,6 @@ def _new_entry(run: TrafficRun, kind: Format) -> Record:
     }
 
 
-def _sensor_record(sensor: MountedSensor, run: TrafficRun) -> Record:
-    return {
-        "label": sensor.label,
-        "model": sensor.model.name,
-        "local_m": sensor.xyz.tolist(),
-        "map_m": (sensor.xyz + run.origin).tolist(),
-        "orientation": sensor.orientation.tolist(),
-    }
-
-
-def _all_there(folder: Path, manifest: Record, entry: Record) -> bool:
-    paths = [*manifest["files"], *(path for sample in entry["samples"] for path in sample["files"])]
-    return all((folder / path).is_file() for path in paths)
-
-
 def _check(frame_id: str, frame: Frame, run: TrafficRun, samples: list[Record]) -> None:
     require_file_name(frame_id, "the frame", "call it something else")
     if samples and frame_id <= samples[-1]["frame"]:
@@ -237,35 +211,24 @@ def _check(frame_id: str, frame: Frame, run: TrafficRun, samples: list[Record]) 
         )
 
 
-def _count(entry: Record, sample: Sample) -> None:
-    """Add a sample's labels to those of its run; a format of clouds alone counts none."""
-    counts = Counter(sample.fates)
-    entry["labels"] = {word: count + counts[word] for word, count in entry["labels"].items()}
-    for name, count in sorted(Counter(sample.classes).items()):
-        entry["classes"][name] = entry["classes"].get(name, 0) + count
-
-
 def _written(folder: Path, kind: Format, sample: Sample) -> Record:
     """Write the missing files of a sample and return its entry in the manifest."""
-    files = {}
-    for path, content in kind.sample_files(sample).items():
-        target = folder / path
-        files[path] = _sha256(target.read_bytes()) if target.is_file() else _write(target, content())
+    contents = kind.sample_files(sample).items()
     return {
         "name": sample.name,
         "frame": sample.frame_id,
         "time_s": sample.frame.time,
         "points": len(sample.frame),
         "labels": len(sample.boxes),
-        "files": files,
+        "files": {path: _write(folder / path, content, keep=True) for path, content in contents},
     }
 
 
-def _write(path: Path, content: bytes) -> str:
+def _write(path: Path, content: Callable[[], bytes], *, keep: bool = False) -> str:
+    """Write a file, or keep one that is there, and return its SHA-256."""
+    if keep and path.is_file():
+        return hashlib.sha256(path.read_bytes()).hexdigest()
+    written = content()
     with whole_file(path) as temporary:
-        temporary.write_bytes(content)
-    return _sha256(content)
-
-
-def _sha256(content: bytes) -> str:
-    return hashlib.sha256(content).hexdigest()
+        temporary.write_bytes(written)
+    return hashlib.sha256(written).hexdigest()

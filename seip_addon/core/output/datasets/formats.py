@@ -36,25 +36,20 @@ Splits = Mapping[str, Sequence[str]]
 
 @dataclass(frozen=True)
 class Format:
-    """A format of datasets.
+    """A format of datasets, by the key that a user types and its name.
 
     Parameters
     ----------
-    key : str
-        What a user types.
-    name : str
-        For people.
     classes : mapping of str to str
-        The format's name of each category of road users. One that is absent gets no label; empty for a format of
-        clouds alone.
+        The format's name of each category of road users. One that is absent gets no label; empty for a format that has
+        only clouds.
     sample_files : callable
-        From a `Sample` to its files: by path in the dataset's folder, what gives the bytes.
+        From a `Sample` to functions that return the bytes of its files, by path in the dataset's folder.
     index_files : callable
         From the dataset's folder and the names of the samples by split to the bytes of the files of the dataset as a
         whole, by path; called when all samples are written.
     notes : callable
-        From a `TrafficRun` to sentences that its users should know. Raises `SeipError` where the format cannot be
-        written here.
+        From a `TrafficRun` to sentences for its users; raises `SeipError` if the format cannot represent it.
     """
 
     key: str
@@ -80,17 +75,14 @@ CLASSES = {
 def label_lines(sample: Sample, xyz: Float) -> str:
     """Return a line ``x y z dx dy dz heading class`` for each box, from which the same float64 are read back.
 
-    Parameters
-    ----------
-    xyz : (k, 3) float64, metres
-        The place of each box by which the format goes.
+    ``xyz`` (k, 3) are the points of the boxes that the format refers to, metres.
     """
-    boxes = sample.boxes
-    values = np.column_stack([xyz, boxes.size, boxes.yaw])
-    return "".join(
-        f"{' '.join(shortest(value) for value in row)} {name}\n"
-        for row, name in zip(values, sample.classes, strict=True)
-    )
+    values = np.column_stack([xyz, sample.boxes.size, sample.boxes.yaw])
+    return "".join(f"{_numbers(row)} {name}\n" for row, name in zip(values, sample.classes, strict=True))
+
+
+def _numbers(row: Float) -> str:
+    return " ".join(map(shortest, row))
 
 
 def read_labels(path: Path) -> tuple[Float, list[str]]:
@@ -133,26 +125,25 @@ def _openpcdet_files(sample: Sample) -> Files:
     reader stumbles over a frame without a label, and drops labels called ``DontCare`` [3]_: such a frame gets one of
     these, and stays in its split, where a detection in it is a false one.
     """
-    return {
-        f"points/{sample.name}.npy": lambda: _npy(sample),
-        f"labels/{sample.name}.txt": lambda: (
-            label_lines(sample, sample.boxes.centre).encode() or NO_OPENPCDET_LABEL.encode()
-        ),
-    }
+    points = io.BytesIO()
+    np.save(points, cloud(sample.frame), allow_pickle=False)
+    lines = label_lines(sample, sample.boxes.centre) or NO_OPENPCDET_LABEL
+    return {f"points/{sample.name}.npy": points.getvalue, f"labels/{sample.name}.txt": lines.encode}
 
 
 def _openpcdet_index(folder: Path, splits: Splits) -> dict[str, bytes]:
     """Return the splits, and a configuration whose range holds every box."""
-    return {**image_sets(splits), "custom_dataset.yaml": _configuration(_label_boxes(folder, splits)).encode()}
+    boxes = [np.empty((0, 7))]
+    for name in (name for names in splits.values() for name in names):
+        found, classes = read_labels(folder / f"labels/{name}.txt")
+        boxes.append(found[[kind != "DontCare" for kind in classes]])
+    return {**image_sets(splits), "custom_dataset.yaml": _configuration(np.concatenate(boxes)).encode()}
 
 
 def point_cloud_range(boxes: Float) -> Float:
     """Return x, y, z from and to, (6,) float64 in metres, that hold all boxes, multiples of `PLAN_STEP`, `HEIGHT_STEP`.
 
-    Parameters
-    ----------
-    boxes : (k, 7) float64
-        Middle, size, heading; without any the range lies around the origin.
+    Boxes (k, 7) are middle, size and heading; without any the range lies around the origin.
     """
     x, y, z, length, width, height, heading = boxes.T if len(boxes) else np.zeros((7, 1))
     along, across = np.abs(np.cos(heading)), np.abs(np.sin(heading))
@@ -164,20 +155,6 @@ def point_cloud_range(boxes: Float) -> Float:
     bottom = math.floor(low[2] * 10) / 10
     top = bottom + HEIGHT_STEP * math.ceil((high[2] - bottom) / HEIGHT_STEP)
     return np.round([*(centre - half), bottom, *(centre + half), top], 1)
-
-
-def _npy(sample: Sample) -> bytes:
-    buffer = io.BytesIO()
-    np.save(buffer, cloud(sample.frame), allow_pickle=False)
-    return buffer.getvalue()
-
-
-def _label_boxes(folder: Path, splits: Splits) -> Float:
-    boxes = [np.empty((0, 7))]
-    for name in (name for names in splits.values() for name in names):
-        found, classes = read_labels(folder / f"labels/{name}.txt")
-        boxes.append(found[[kind != "DontCare" for kind in classes]])
-    return np.concatenate(boxes)
 
 
 def _configuration(boxes: Float) -> str:
@@ -245,34 +222,22 @@ def _mmdetection3d_index(folder: Path, splits: Splits) -> dict[str, bytes]:
 
 
 def _information(folder: Path, names: Sequence[str]) -> bytes:
-    value = {
-        "metainfo": {"categories": LABELS, "dataset": "custom", "info_version": "1.1"},
-        "data_list": [
+    samples = []
+    for name in names:
+        boxes, classes = read_labels(folder / f"labels/{name}.txt")
+        rows = zip(boxes.tolist(), classes, strict=True)
+        samples.append(
             {
                 "sample_idx": int(name),
                 "lidar_points": {"num_pts_feats": 4, "lidar_path": f"{name}.bin"},
-                "instances": _instances(folder / f"labels/{name}.txt"),
+                "instances": [{"bbox_3d": box, "bbox_label_3d": LABELS[kind]} for box, kind in rows],
             }
-            for name in names
-        ],
-    }
-    return pickle.dumps(value, protocol=PICKLE_PROTOCOL)
+        )
+    about = {"categories": LABELS, "dataset": "custom", "info_version": "1.1"}
+    return pickle.dumps({"metainfo": about, "data_list": samples}, protocol=PICKLE_PROTOCOL)
 
 
-def _instances(path: Path) -> list[dict[str, Any]]:
-    boxes, classes = read_labels(path)
-    return [{"bbox_3d": box, "bbox_label_3d": LABELS[name]} for box, name in zip(boxes.tolist(), classes, strict=True)]
-
-
-KITTI_CLASSES = {
-    "car": "Car",
-    "van": "Van",
-    "truck": "Truck",
-    "bus": "Truck",
-    "motorcycle": "Cyclist",
-    "bicycle": "Cyclist",
-    "pedestrian": "Pedestrian",
-}
+KITTI_CLASSES = {category: KITTI_CLASS[name] for category, name in CLASSES.items()}
 """KITTI has neither buses nor motorcycles; readers ignore or refuse a name that it does not have."""
 
 NO_KITTI_LABEL = "DontCare -1 -1 -10 0 0 0 0 -1 -1 -1 -1000 -1000 -1000 -10\n"  # the label of a frame without any
@@ -315,20 +280,14 @@ def _label_file(sample: Sample) -> bytes:
     numbers, alpha = camera_boxes(boxes.centre, boxes.size, boxes.yaw)
     occluded = np.where(boxes.visibility >= FULLY_VISIBLE, 0, np.where(boxes.visibility >= PARTLY_VISIBLE, 1, 2))
     lines = "".join(
-        f"{name} 0 {hidden} {shortest(angle)} 0 0 {PIXELS} {PIXELS} {' '.join(shortest(number) for number in row)}\n"
+        f"{name} 0 {hidden} {shortest(angle)} 0 0 {PIXELS} {PIXELS} {_numbers(row)}\n"
         for name, hidden, angle, row in zip(sample.classes, occluded, alpha, numbers, strict=True)
     )
     return (lines or NO_KITTI_LABEL).encode()
 
 
 def camera_boxes(centre: Float, size: Float, yaw: Float) -> tuple[Float, Float]:
-    """Return boxes in the camera's axes.
-
-    Parameters
-    ----------
-    centre, size : (k, 3) float64, metres
-        Middle, and length, width, height.
-    yaw : (k,) float64, radians
+    """Return boxes in the camera's axes, from their middles, lengths, widths and heights (k, 3), and yaws (k,).
 
     Returns
     -------
@@ -386,10 +345,7 @@ def _pcd_files(sample: Sample) -> Files:
 def encode(points: NDArray[Any], viewpoint: Sequence[float] = IDENTITY) -> bytes:
     """Return a structured array of little-endian float32 fields, (n,), as a binary PCD file.
 
-    Parameters
-    ----------
-    viewpoint : sequence of 7 float
-        Position (metres) and orientation (quaternion w, x, y, z) of the sensor in the axes of the points.
+    The viewpoint is the position (metres) and orientation (quaternion w, x, y, z) of the sensor in the points' axes.
     """
     names = points.dtype.names or ()
     lines = (
@@ -416,20 +372,13 @@ def _pcd_notes(run: TrafficRun) -> tuple[str, ...]:
 
 
 def kitti_results(boxes: Float, categories: Sequence[str], score: Float) -> str:
-    """Return a line of KITTI's results for each detection: a label, and the score.
+    """Return a line of KITTI's results for each detection: a label, and the score (0 to 1).
 
-    Parameters
-    ----------
-    boxes : (k, 7) float64
-        x, y, z of the middle, length, width, height (metres), yaw (radians), local site axes.
-    categories : sequence of str
-        Category of each box.
-    score : (k,) float64, 0 to 1
+    Boxes (k, 7) are x, y, z of the middle, length, width, height (metres) and yaw (radians) in local site axes.
     """
     numbers, alpha = camera_boxes(boxes[:, :3], boxes[:, 3:6], boxes[:, 6])
     return "".join(
-        f"{KITTI_CLASSES[category]} -1 -1 {shortest(angle)} 0 0 {PIXELS} {PIXELS} "
-        f"{' '.join(shortest(value) for value in row)} {shortest(points)}\n"
+        f"{KITTI_CLASSES[category]} -1 -1 {shortest(angle)} 0 0 {PIXELS} {PIXELS} {_numbers(row)} {shortest(points)}\n"
         for category, angle, row, points in zip(categories, alpha, numbers, score, strict=True)
     )
 
@@ -437,7 +386,7 @@ def kitti_results(boxes: Float, categories: Sequence[str], score: Float) -> str:
 def openpcdet_results(boxes: Float, categories: Sequence[str], score: Float) -> str:
     """Return a line ``x y z dx dy dz heading class score`` for each detection; see `kitti_results`."""
     return "".join(
-        f"{' '.join(shortest(value) for value in row)} {CLASSES[category]} {shortest(points)}\n"
+        f"{_numbers(row)} {CLASSES[category]} {shortest(points)}\n"
         for row, category, points in zip(boxes, categories, np.asarray(score), strict=True)
     )
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...arrays import Boolean, Float
+from ...arrays import Float
 from ...errors import SeipError
 from ...sensing.scans.frame import Frame, Labels
 from ...sensing.scans.sensor import MountedSensor
@@ -33,17 +33,15 @@ class TrafficRun:
     Parameters
     ----------
     name : str
-        Name of the run, unique in a dataset; also the name of its folders.
-    split : str
-        One of `SPLITS`.
+        Name of the run and of its folders, unique in a dataset.
     key : str
-        Digest of all that the frames follow from: runs of one key are the same frames.
+        Digest of all inputs of the frames: runs of one key are the same frames.
     sensors : tuple of MountedSensor
         In the order of the frames' sensor numbers.
     origin : (3,) float64, metres
         Map coordinates of the local origin: map = local + origin.
     record : mapping
-        What else the manifest shall say of the simulation (seeds, settings, versions): values that JSON can hold.
+        More about the simulation for the manifest (seeds, settings, versions): values that JSON can hold.
     """
 
     name: str
@@ -61,28 +59,23 @@ class TrafficRun:
             raise SeipError(f"the run '{self.name}' has no sensors; place some and simulate it again")
         for sensor in self.sensors:
             require_file_name(sensor.label, "the sensor", "rename its empty")
-        labels = Counter(sensor.label.lower() for sensor in self.sensors)
-        twice = next((label for label, count in labels.items() if count > 1), None)
-        if twice is not None:
-            raise SeipError(f"two sensors are called '{twice}'; rename one")
+        label, count = Counter(sensor.label.lower() for sensor in self.sensors).most_common(1)[0]
+        if count > 1:
+            raise SeipError(f"two sensors are called '{label}'; rename one")
 
 
 @dataclass(frozen=True, eq=False)
 class Sample:
-    """A frame as it stands in a dataset.
+    """A frame in a dataset.
 
     Parameters
     ----------
-    number : int
-        Number of the frame in the whole dataset, from 0.
-    frame_id : str
-        Identifier of the frame in its run.
-    frame : Frame
-        With all its labels.
+    number, frame_id
+        Number of the frame in the whole dataset, from 0, and its identifier in its run.
     fates : tuple of str
-        Outcome for each of them, one of `OUTCOMES`.
-    classes : tuple of str
-        Class of each box, as the format names it.
+        Outcome for each label of the frame, one of `OUTCOMES`.
+    boxes, classes
+        Labels that are written, and the class of each, as the format names it.
     """
 
     number: int
@@ -102,16 +95,9 @@ class Sample:
 def make_sample(
     place: tuple[int, str], run: TrafficRun, frame: Frame, classes: Mapping[str, str], min_points: int
 ) -> Sample:
-    """Return a frame with those labels that are to be written.
+    """Return a frame, by its number in the dataset and its id in the run, with the labels that are to be written.
 
-    Parameters
-    ----------
-    place : (int, str)
-        The frame's number in the dataset and its id in the run.
-    classes : mapping of str to str
-        The format's name of each category.
-    min_points : int
-        Returns of all sensors together that a label needs.
+    A label needs a class of the format and ``min_points`` returns of all sensors together.
 
     Examples
     --------
@@ -132,14 +118,10 @@ def make_sample(
         OUTSIDE if not inside else NO_CLASS if str(category) not in classes else TOO_FEW if few else WRITTEN
         for inside, category, few in zip(labels.inside, labels.category, returns < min_points, strict=True)
     )
-    boxes = subset(labels, np.array([fate == WRITTEN for fate in found], dtype=bool))
+    kept = np.array([fate == WRITTEN for fate in found], dtype=bool)
+    boxes = Labels(**{part.name: getattr(labels, part.name)[kept] for part in fields(Labels)})
     names = tuple(classes[str(category)] for category in boxes.category)
     return Sample(*place, run=run, frame=frame, fates=found, boxes=boxes, classes=names)
-
-
-def subset(labels: Labels, keep: Boolean) -> Labels:
-    """Return those of the labels where ``keep``, (k,) bool, is true."""
-    return Labels(**{part.name: getattr(labels, part.name)[keep] for part in fields(Labels)})
 
 
 def cloud(frame: Frame) -> NDArray[np.float32]:

@@ -14,9 +14,10 @@ from ..pictures.drawing import percent
 from ..pictures.palette import INK, PAPER, PAPER_STREETS, SHARE_COLOURS, SOFT_INK
 from ..report.html import page
 from ..report.wording import dollars
-from .network_record import NetworkRecord, NetworkSite
-from .network_view import BARE_RADIUS, NetworkView, Street, legend_money, network_view, radius_of
-from .ranked_sites import (
+from .network_map import BARE_RADIUS, NetworkView, Street, legend_money, network_view, radius_of
+from .network_record import (
+    NetworkRecord,
+    NetworkSite,
     RankedSite,
     colour_title,
     gain_text,
@@ -24,6 +25,7 @@ from .ranked_sites import (
     level_words,
     outcome,
     ranked_sites,
+    result,
     sensors_text,
 )
 
@@ -72,6 +74,9 @@ def network_page(record: NetworkRecord, streets: Sequence[Street] | None = None)
         if equipped
         else "No site has sensors."
     )
+    length = round_number(view.width / 6)
+    words = f"{length:g} m" if length < 1000 else f"{length / 1000:g} km"
+    bar = f'<div class="scale" style="width: {100 * length / view.width:.3f}%"></div><span>{words}</span>'
     credits_ = "".join(f"<div>{escape(line)}</div>" for line in record.attribution)
     body = f"""<header>
 <h1><bdi>{escape(record.name)}</bdi></h1>
@@ -80,7 +85,7 @@ def network_page(record: NetworkRecord, streets: Sequence[Street] | None = None)
 <main>
 <a class="skip" href="#sites">Skip the map</a>
 {_map(record, view, ranked)}
-<div class="under">{_scale(view)}<div>{credits_}</div></div>
+<div class="under"><div style="flex: 1 0 100%">{bar}</div><div>{credits_}</div></div>
 {_legend(record, view)}
 <h2 id="sites">Sites</h2>
 <div class="wide">
@@ -136,13 +141,6 @@ def _described(record: NetworkRecord, site: NetworkSite) -> str:
     return f"{sensors_text(site.sensors, record.sensor_names)}, {dollars(site.price_usd)}, {typical}{seen}"
 
 
-def _scale(view: NetworkView) -> str:
-    length = round_number(view.width / 6)
-    words = f"{length:g} m" if length < 1000 else f"{length / 1000:g} km"
-    width = f"{100 * length / view.width:.3f}%"
-    return f'<div style="flex: 1 0 100%"><div class="scale" style="width: {width}"></div><span>{words}</span></div>'
-
-
 def _legend(record: NetworkRecord, view: NetworkView) -> str:
     entries = [f"<li>{colour_title(record)}:</li>"]
     for colour, words in zip(SHARE_COLOURS, level_words(record), strict=True):
@@ -176,8 +174,8 @@ def _table(record: NetworkRecord, ranked: tuple[RankedSite, ...]) -> str:
 def _row(record: NetworkRecord, one: RankedSite) -> str:
     site = one.site
     equipped = site.status == "equipped"
-    value = percent(site.coverage) if record.criterion == "road" else outcome(record, site.value)
-    figures = (value, gain_text(record, one.gain), dollars(site.price_usd)) if equipped else ("–", "–", "–")
+    known = (result(record, site), gain_text(record, one.gain), dollars(site.price_usd))
+    figures = known if equipped else ("–", "–", "–")
     cells = "".join(f'<td class="number">{words}</td>' for words in figures)
     sensors = sensors_text(site.sensors, record.sensor_names) if equipped else _described(record, site)
     place = "./" + quote(site.folder, safe="/")

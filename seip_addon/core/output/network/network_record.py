@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from bisect import bisect_right
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import Any, Literal
 
+from ...choosing.placement.returns_summary import returns_text
 from ...storage.json_dataclass import as_json
+from ..pictures.drawing import percent
 
 SCHEMA = "seip-network/2"
 
@@ -17,16 +22,7 @@ PROVEN = 1e-9
 
 @dataclass(frozen=True)
 class NetworkPoint:
-    """Value of the criterion for at most an amount of money, and the proven bound on it.
-
-    Parameters
-    ----------
-    price_usd : float, dollars
-    value : float
-        Best value found.
-    bound : float
-        No placement within that money has a larger value.
-    """
+    """Best value of the criterion found for at most an amount of money, and the proven bound on it."""
 
     price_usd: float
     value: float
@@ -46,7 +42,6 @@ class NetworkSensor:
         Height above the ground.
     position : str
         Name of the pole or the area that carries it.
-    price_usd : float, dollars
     """
 
     id: str
@@ -68,11 +63,8 @@ class NetworkSite:
         Name, and folder of its own files below that of the network.
     weight : float
         Importance of the site, as given.
-    status : {"equipped", "without sensor", "failed"}
     message : str
         Reason if the site failed, otherwise "".
-    price_usd : float, dollars
-        Money spent at the site.
     value, bound : float
         Value of the criterion at the site with its sensors, and a bound on it for that money.
     coverage : float, 0 to 1
@@ -111,14 +103,11 @@ class NetworkRecord:
     curve : tuple of NetworkPoint
         Value of the network for amounts of money; prices rise.
     sensor_types : tuple of str
-        Types to choose from, by their keys in the catalogue.
-    sensor_names : mapping of str to str
-        Name of the product for each key.
+        Types to choose from, by their keys in the catalogue; ``sensor_names`` has the products.
     created : str
         Time of the placement (ISO 8601), "" if it is not recorded.
     goal : float, optional
-        Share of the road that is seen at every site at the least price, where that was asked for; the budget is then
-        the price.
+        Share of the road to be seen at every site at the least price; the budget is then the price.
     least_usd : float, dollars
         Proven bound: nothing cheaper reaches the goal.
     """
@@ -179,3 +168,82 @@ def network_gap(criterion: Literal["road", "returns"], value: float, bound: floa
 def network_json(record: NetworkRecord) -> dict[str, Any]:
     """Return a record as a JSON value with its schema."""
     return {"schema": SCHEMA, **as_json(record)}
+
+
+COVERAGE_STEPS, RETURNS_STEPS = (0.2, 0.4, 0.6, 0.8), (1.0, 5.0, 20.0, 100.0)
+"""Coverages, and typical returns, at which a site gets the next of `SHARE_COLOURS`."""
+_ORDER = ("equipped", "without sensor", "failed")
+
+
+@dataclass(frozen=True)
+class RankedSite:
+    """Site with its number in the order, from 1, and its gain.
+
+    ``gain`` is that of the criterion for $1,000 spent at the site, times its weight over the mean weight; None if no
+    money is spent there.
+    """
+
+    number: int
+    site: NetworkSite
+    gain: float | None
+
+    @property
+    def rank(self) -> int | None:
+        """Rank by gain per dollar; None if no money is spent at the site."""
+        return None if self.gain is None else self.number
+
+
+def ranked_sites(record: NetworkRecord) -> tuple[RankedSite, ...]:
+    """Return the sites by falling gain per dollar; those without money, without sensor and failed ones follow."""
+    weights = [site.weight for site in record.sites if site.status != "failed"]
+    mean = math.fsum(weights) / len(weights) if weights else 0.0
+    rows: list[tuple[NetworkSite, float | None]] = []
+    for site in record.sites:
+        paid = site.status == "equipped" and site.price_usd > 0
+        relative = site.weight / mean if mean > 0 else 1.0
+        rows.append((site, relative * site.value / site.price_usd * 1000.0 if paid else None))
+    rows.sort(key=lambda row: (_ORDER.index(row[0].status), row[1] is None, -(row[1] or 0.0)))
+    return tuple(RankedSite(number, *row) for number, row in enumerate(rows, start=1))
+
+
+def sensors_text(sensors: Sequence[NetworkSensor], names: Mapping[str, str]) -> str:
+    """Return the number of sensors of each type, by name or key, most frequent first: ``2 × OS1-128, 1 × VLP-32C``."""
+    types = Counter(sensor.sensor for sensor in sensors)
+    return ", ".join(f"{number} × {names.get(key, key)}" for key, number in types.most_common())
+
+
+def outcome(record: NetworkRecord, value: float) -> str:
+    """Return a value of the criterion as coverage in per cent, or as a typical number of returns."""
+    return percent(value) if record.criterion == "road" else returns_text(math.expm1(value))
+
+
+def result(record: NetworkRecord, site: NetworkSite) -> str:
+    """Return the result of a site: the road seen, or the typical number of returns."""
+    return percent(site.coverage) if record.criterion == "road" else outcome(record, site.value)
+
+
+def gain_text(record: NetworkRecord, gain: float | None) -> str:
+    """Return a gain per $1,000 in percentage points, or as the percentage by which 1 + typical returns grows."""
+    if gain is None:
+        return "–"
+    return f"{gain:.2%}".replace("%", " points") if record.criterion == "road" else f"{math.expm1(min(gain, 50)):.1%}"
+
+
+def level(record: NetworkRecord, site: NetworkSite) -> int:
+    """Return the index of a site's colour among `SHARE_COLOURS`."""
+    if record.criterion == "road":
+        return bisect_right(COVERAGE_STEPS, site.coverage)
+    return bisect_right(RETURNS_STEPS, math.expm1(site.value))
+
+
+def level_words(record: NetworkRecord) -> tuple[str, ...]:
+    """Return what each of `SHARE_COLOURS` means."""
+    road = record.criterion == "road"
+    steps = [f"{step:.0%}" if road else f"{step:g}" for step in (COVERAGE_STEPS if road else RETURNS_STEPS)]
+    between = [f"{low.removesuffix('%')}–{high}" for low, high in pairwise(steps)]
+    return (f"< {steps[0]}", *between, f"≥ {steps[-1]}")
+
+
+def colour_title(record: NetworkRecord) -> str:
+    """Return what the colours of sites show."""
+    return "Road seen" if record.criterion == "road" else "Typical returns from a road user"

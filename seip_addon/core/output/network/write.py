@@ -3,26 +3,30 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
 from ...counts import counted
 from ...storage.csv_table import save_csv
 from ...storage.files import save_json, whole_file
 from ..pictures.drawing import percent
-from ..report.blocks import Block, Bullets, Facts, Paragraph, Picture, Report, Section, Table
-from ..report.html import as_html
-from ..report.pdf import as_pdf
+from ..report.blocks import Block, Bullets, Facts, Paragraph, Picture, Report, Table, make_sections
+from ..report.pdf import save_report
 from ..report.wording import date, dollars
 from ..results.answer import sentence
-from ..results.file_names import REPORT_FILES
-from ..results.geojson import Feature, feature, save_features
-from ..results.located import DECIMALS
+from ..results.geographic_files import DECIMALS, Feature, feature, save_features
+from .network_map import MAP_SHAPE, Street, caption, draw_curve, draw_map, network_view
 from .network_page import network_page
-from .network_pictures import MAP_SHAPE, caption, draw_curve, draw_map
-from .network_record import NetworkRecord, network_json
-from .network_view import Street, network_view
-from .ranked_sites import RankedSite, gain_text, outcome, ranked_sites, sensors_text
+from .network_record import (
+    NetworkRecord,
+    RankedSite,
+    gain_text,
+    network_json,
+    outcome,
+    ranked_sites,
+    result,
+    sensors_text,
+)
 
 COLUMNS = (
     *("rank", "name", "latitude_deg", "longitude_deg", "weight", "status", "sensors", "types", "price_usd", "value"),
@@ -57,45 +61,32 @@ def write_network(folder: Path, record: NetworkRecord, streets: Sequence[Street]
     SeipError
         The folder or a file cannot be written.
     """
-    picture = draw_map(record, network_view(record, streets, (MAP_SHAPE, MAP_SHAPE)))
-    curve = draw_curve(record)
-    report = make_network_report(record, picture, curve)
-    contents = (picture, curve, network_page(record, streets).encode(), as_html(report).encode(), as_pdf(report))
+    pictures = (draw_map(record, network_view(record, streets, (MAP_SHAPE, MAP_SHAPE))), draw_curve(record))
+    report = make_network_report(record, *pictures)
+    contents = (*pictures, network_page(record, streets).encode())
     save_json(folder / NETWORK_FILES[0], network_json(record))
-    save_network_geojson(folder / NETWORK_FILES[1], record)
-    save_sites_table(folder / NETWORK_FILES[2], record)
-    names = (*PICTURES, PAGE, *REPORT_FILES)
-    for name, content in zip(names, contents, strict=True):
+    save_features(folder / NETWORK_FILES[1], record.name, record.attribution, _features(record))
+    save_csv(
+        folder / NETWORK_FILES[2], COLUMNS, [[_figures(one)[name] for name in COLUMNS] for one in ranked_sites(record)]
+    )
+    for name, content in zip((*PICTURES, PAGE), contents, strict=True):
         with whole_file(folder / name) as temporary:
             temporary.write_bytes(content)
-    return tuple(folder / name for name in (*NETWORK_FILES, *names))
-
-
-def save_sites_table(path: Path, record: NetworkRecord) -> None:
-    """Write a row for each site, by gain per dollar."""
-    save_csv(path, COLUMNS, [[_figures(one)[name] for name in COLUMNS] for one in ranked_sites(record)])
-
-
-def save_network_geojson(path: Path, record: NetworkRecord) -> None:
-    """Write the sites and their sensors as points on WGS 84 (RFC 7946)."""
-    about: dict[str, object] = {"type": "FeatureCollection", "name": record.name}
-    if record.attribution:
-        about["attribution"] = record.attribution
-    save_features(path, about, _features(record))
+    return (*(folder / name for name in (*NETWORK_FILES, *PICTURES, PAGE)), *save_report(folder, report))
 
 
 def _features(record: NetworkRecord) -> Iterator[Feature]:
+    """Yield the sites and their sensors as points on WGS 84."""
     ranked = ranked_sites(record)
     for one in ranked:
         figures = _figures(one)
-        place = _point(figures.pop("longitude_deg"), figures.pop("latitude_deg"))
-        yield feature("site", place, **figures)
+        yield feature("site", "Point", [figures.pop("longitude_deg"), figures.pop("latitude_deg")], **figures)
     for one in ranked:
         for sensor in one.site.sensors:
-            place = _point(_within_a_turn(sensor.longitude), round(sensor.latitude, DECIMALS))
+            place = [_within_a_turn(sensor.longitude), round(sensor.latitude, DECIMALS)]
             figures = {"id": sensor.id, "site": one.site.name, "folder": one.site.folder, "sensor": sensor.sensor}
             figures |= {"position": sensor.position, "height_m": round(sensor.height_m, 3)}
-            yield feature("sensor", place, **figures, price_usd=round(sensor.price_usd, 2))
+            yield feature("sensor", "Point", place, **figures, price_usd=round(sensor.price_usd, 2))
 
 
 def _figures(one: RankedSite) -> dict[str, object]:
@@ -113,10 +104,6 @@ def _figures(one: RankedSite) -> dict[str, object]:
     }
 
 
-def _point(longitude: object, latitude: object) -> dict[str, object]:
-    return {"type": "Point", "coordinates": [longitude, latitude]}
-
-
 def _within_a_turn(longitude: float) -> float:
     """Return a longitude from -180 to 180 degrees, which RFC 7946 asks for."""
     return round(longitude - 360.0 * round(longitude / 360.0), DECIMALS)
@@ -125,46 +112,43 @@ def _within_a_turn(longitude: float) -> float:
 def make_network_report(record: NetworkRecord, drawn_map: bytes, drawn_curve: bytes) -> Report:
     """Return the report with the map and the curve, PNG, on its first page."""
     ranked = ranked_sites(record)
-    sections = (
-        Section("Sites with sensors", tuple(_equipped(record, ranked))),
-        Section("Sites that failed", tuple(_failed(ranked))),
-        Section("Notes", (Bullets(tuple(map(sentence, record.notes))),) if record.notes else ()),
-        Section("Sources", (Bullets(record.attribution),) if record.attribution else ()),
-    )
-    when = f", {date(record.created)}" if record.created else ""
+    failed = tuple((one.site.name, one.site.message) for one in ranked if one.site.status == "failed")
+    left_out = (Paragraph("The figures of the network leave these sites out."), Table(("Site", "Reason"), failed))
+    contents: dict[str, Iterable[Block]] = {
+        "Sites with sensors": _equipped(record, ranked),
+        "Sites that failed": left_out if failed else (),
+        "Notes": [Bullets(tuple(map(sentence, record.notes)))] if record.notes else [],
+        "Sources": [Bullets(record.attribution)] if record.attribution else [],
+    }
     first = (
         Facts(tuple(_key_figures(record)), large=True),
         Picture(drawn_map, "Sites, north is up. Colour shows the result, area the money; hollow: without sensor."),
         Picture(drawn_curve, caption(record)),
     )
-    title = f"Roadside LiDAR sensors at the sites of a network{when}"
-    return Report(record.name, title, record.created, first, tuple(each for each in sections if each.blocks))
+    title = f"Roadside LiDAR sensors at the sites of a network{f', {date(record.created)}' if record.created else ''}"
+    return Report(record.name, title, record.created, first, make_sections(contents))
 
 
 def _key_figures(record: NetworkRecord) -> Iterator[tuple[str, str]]:
-    count = {status: sum(site.status == status for site in record.sites) for status in ("equipped", "failed")}
-    failed = f", {count['failed']:,} failed" if count["failed"] else ""
-    yield "Sites", f"{count['equipped']:,} of {len(record.sites):,} have sensors{failed}"
+    usable = [site for site in record.sites if site.status != "failed"]
+    equipped, failed = sum(site.status == "equipped" for site in usable), len(record.sites) - len(usable)
+    yield "Sites", f"{equipped:,} of {len(record.sites):,} have sensors{f', {failed:,} failed' if failed else ''}"
     sensors = [sensor for site in record.sites for sensor in site.sensors]
     yield "Sensors", f"{len(sensors):,}: {sensors_text(sensors, record.sensor_names)}" if sensors else "none"
     yield "Money", f"{dollars(record.price_usd)} of a budget of {dollars(record.budget_usd)}"
-    yield "Quality", _quality(record)
-    if count["failed"] < len(record.sites):
-        yield "Proof", record.certificate
-
-
-def _quality(record: NetworkRecord) -> str:
-    usable = [site for site in record.sites if site.status != "failed"]
     if not usable:
-        return "no site could be computed"
-    weights = {site.weight for site in usable}
-    mean = "mean of the sites" if len(weights) == 1 else "mean of the sites by their weights"
+        yield "Quality", "no site could be computed"
+        return
+    mean = f"mean of the sites{' by their weights' if len({site.weight for site in usable}) > 1 else ''}"
+    typical = outcome(record, record.value)
     if record.criterion == "road":
-        return f"{outcome(record, record.value)} of the road is seen ({mean})"
-    total = math.fsum(site.weight for site in usable) or 1.0
-    seen = math.fsum(site.weight * site.coverage for site in usable) / total
-    points = f"about {outcome(record, record.value)} measured points on a typical road user in each revolution"
-    return f"{points}; {percent(min(seen, 1.0))} of the road is seen ({mean})"
+        yield "Quality", f"{typical} of the road is seen ({mean})"
+    else:
+        total = math.fsum(site.weight for site in usable) or 1.0
+        seen = percent(min(math.fsum(site.weight * site.coverage for site in usable) / total, 1.0))
+        points = f"about {typical} measured points on a typical road user in each revolution"
+        yield "Quality", f"{points}; {seen} of the road is seen ({mean})"
+    yield "Proof", record.certificate
 
 
 def _equipped(record: NetworkRecord, ranked: tuple[RankedSite, ...]) -> Iterator[Block]:
@@ -175,23 +159,12 @@ def _equipped(record: NetworkRecord, ranked: tuple[RankedSite, ...]) -> Iterator
     if not equipped:
         return
     yield Paragraph(f"Sites by gain per dollar. {GAIN[record.criterion]}, times its weight over the mean weight.")
-    figure = "Road seen" if record.criterion == "road" else "Returns"
     rows = tuple(
         (
             *(str(one.rank or "–"), one.site.name, sensors_text(one.site.sensors, record.sensor_names)),
-            *(dollars(one.site.price_usd), _result(record, one), gain_text(record, one.gain)),
+            *(dollars(one.site.price_usd), result(record, one.site), gain_text(record, one.gain)),
         )
         for one in equipped
     )
+    figure = "Road seen" if record.criterion == "road" else "Returns"
     yield Table(("Rank", "Site", "Sensors", "Money", figure, "Gain per $1,000"), rows, frozenset({0, 3, 4, 5}))
-
-
-def _result(record: NetworkRecord, one: RankedSite) -> str:
-    return percent(one.site.coverage) if record.criterion == "road" else outcome(record, one.site.value)
-
-
-def _failed(ranked: tuple[RankedSite, ...]) -> Iterator[Block]:
-    rows = tuple((one.site.name, one.site.message) for one in ranked if one.site.status == "failed")
-    if rows:
-        yield Paragraph("The figures of the network leave these sites out.")
-        yield Table(("Site", "Reason"), rows)

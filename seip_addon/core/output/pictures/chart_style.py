@@ -2,14 +2,15 @@
 
 import math
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import Any, Literal
 
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ...estimates import IntervalEstimate
-from .drawing import new_page, save_png
+from .drawing import Window, new_page, save_png, window_around
 from .palette import INK, SERIES_COLOURS, SOFT_INK
 
 MARKERS = ("o", "s", "^", "D", "v", "P", "X")  # one more than colours, so that pairs repeat only after 42 series
@@ -35,15 +36,15 @@ def new_figure(
     return figure, list(figure.subplots(1, panels, sharey=sharey, squeeze=False)[0])
 
 
-def limits_around(bounds: Iterable[float], margin: float) -> tuple[dict[str, Any], float]:
+def limits_around(bounds: Window, margin: float) -> tuple[dict[str, Any], float]:
     """Return the limits of a plan around (left, bottom, right, top), with a relative margin, and its shape.
 
     The shape is how many times as high as wide it is.
     """
     left, bottom, right, top = bounds
-    around = margin * max(right - left, top - bottom)
-    limits = {"xlim": (left - around, right + around), "ylim": (bottom - around, top + around), "aspect": "equal"}
-    return limits, (top - bottom + 2 * around) / (right - left + 2 * around)
+    left, bottom, right, top = window_around(bounds, margin * max(right - left, top - bottom))
+    limits = {"xlim": (left, right), "ylim": (bottom, top), "aspect": "equal"}
+    return limits, (top - bottom) / (right - left)
 
 
 def style_axes(panel: Axes, x: str = "", y: str = "", grid: Literal["both", "x", "y"] = "both", **font: Any) -> None:  # noqa: ANN401 -- matplotlib's own
@@ -71,7 +72,12 @@ def add_legend(figure: Figure, panels: Sequence[Axes], columns: int | None = Non
     if columns is None:
         widths, room = [0.6 + 0.07 * len(label) for label in labels], figure.get_figwidth()  # inches, about
         columns = len(labels) if sum(widths) < room else max(1, int(room // max(widths)))
-    legend = figure.legend(handles, labels, frameon=False, fontsize=9, loc="outside lower center", ncols=columns)
+    plain_legend(figure, handles, labels, loc="outside lower center", ncols=columns)
+
+
+def plain_legend(figure: Figure, handles: Sequence[Artist], labels: Sequence[str], **style: Any) -> None:  # noqa: ANN401 -- as above
+    """Write a legend without a frame whose labels are never taken for formulas."""
+    legend = figure.legend(handles, labels, **{"frameon": False, "fontsize": 9} | style)
     for text in legend.get_texts():
         text.set_parse_math(False)
 

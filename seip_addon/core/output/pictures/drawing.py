@@ -15,14 +15,15 @@ from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.font_manager import FontProperties, findfont, get_font
 from matplotlib.ft2font import FT2Font, LoadFlags
+from matplotlib.patches import Rectangle
 from PIL import Image
 
 from ...arrays import Boolean, Float
 from ...choosing.placement.deployment import Deployment, price_text
-from ...counts import counted
+from ...counts import counted, round_number
 from ...site.site import Site
 from ...storage.files import whole_file
-from .callouts import place_callouts
+from .labels import place_callouts
 from .palette import INK, PAPER, SOFT_INK
 
 Style = dict[str, Any]
@@ -34,12 +35,17 @@ HIDDEN_MARK: Style = {"mfc": "none", "mec": INK, "mew": 2.0}
 MARK_RADIUS, LABEL_SIZE, LABEL_PADDING = 8.0, 10.0, 0.35  # points, points, share of the size
 MANY_MARK_SIZE = 8.0  # points
 ATTRIBUTION_SIZE = 8.5  # points
+NOTE_PAPER: Style = {"boxstyle": "square,pad=0.25", "facecolor": PAPER, "alpha": 0.85, "edgecolor": "none"}
 ATTRIBUTION_ORDER = 100  # drawing order of credits: over everything
 MAX_LABELLED_IN_FULL = 12  # of more sensors than these the legend alone gives type and height
 NAME_SIZE, RESULT_SIZE = 18.0, 12.0  # points
 TOP, NAME_LINE, RESULT_LINE = 0.2, 0.34, 0.24  # inches
 MEASURED_SIZE = 20.0  # points, at which the widths of texts are measured
 SEPARATOR = "  ·  "
+SCALE_SIZE = 9.0  # points
+CORNER_ORDER = 6.0  # drawing order of scale and arrow: over the map and under its sensors
+Window = tuple[float, float, float, float]
+"""Left, bottom, right and top of a part of the plane, metres."""
 
 
 def new_page(size: tuple[float, float], dpi: float, layout: Literal["constrained"] | None = None) -> Figure:
@@ -99,11 +105,31 @@ def draw_polygons(axes: Axes, polygons: Iterable[Float], **style: Any) -> None: 
     axes.add_collection(PolyCollection(list(polygons), **style), autolim=False)
 
 
-def add_axes(figure: Figure, left: float, bottom: float, width: float, height: float) -> Axes:
-    """Return axes without ticks at a place given in inches."""
+def window_around(bounds: Iterable[float], margin: float, shapes: tuple[float, float] = (0.0, np.inf)) -> Window:
+    """Return the window around (left, bottom, right, top) with a margin, as high as wide times a number in ``shapes``.
+
+    Examples
+    --------
+    >>> window_around((0.0, 0.0, 40.0, 10.0), 5.0, shapes=(0.5, 1.0))
+    (-5.0, -7.5, 45.0, 17.5)
+    """
+    left, bottom, right, top = bounds
+    width, height = right - left + 2 * margin, top - bottom + 2 * margin
+    width, height = max(width, height / shapes[1]), max(height, width * shapes[0])
+    x, y = (left + right) / 2, (bottom + top) / 2
+    return x - width / 2, y - height / 2, x + width / 2, y + height / 2
+
+
+def add_axes(
+    figure: Figure, left: float, bottom: float, width: float, height: float, window: Window | None = None
+) -> Axes:
+    """Return axes without ticks at a place given in inches; those of a map show a window of the plane."""
     page_width, page_height = figure.get_size_inches()
     axes = figure.add_axes((left / page_width, bottom / page_height, width / page_width, height / page_height))
     axes.set(xticks=(), yticks=())
+    if window is not None:
+        axes.set(xlim=(window[0], window[2]), ylim=(window[1], window[3]))
+        axes.spines[:].set(color=SOFT_INK, linewidth=0.8)
     return axes
 
 
@@ -121,7 +147,7 @@ def draw_sensors(  # noqa: PLR0913  # what labels need to keep off
     *,
     zorder: float,
     hidden: Boolean | None = None,
-    taken: Float | None = None,
+    taken: Sequence[Window] = (),
 ) -> None:
     """Mark each sensor and write its label next to it, no label on another; with type and height if there are few.
 
@@ -130,15 +156,13 @@ def draw_sensors(  # noqa: PLR0913  # what labels need to keep off
     axes : Axes
         With their final limits.
     points : (k, 2) float64
-        Where each sensor is, in data coordinates.
-    road : (t, 2) float64
-        Position of each target; labels avoid them where possible.
+        Position of each sensor on the picture.
+    road, taken
+        As for `draw_callouts`.
     zorder : float
         Drawing order of the marks; labels and their lines are drawn below.
     hidden : (k,) bool, optional
         Hidden sensors, which are marked by an outline only.
-    taken : (n, 4) float64, optional
-        Left, bottom, right and top of boxes without labels, in data coordinates.
     """
     sensors = deployment.sensors
     in_full = len(sensors) <= MAX_LABELLED_IN_FULL
@@ -218,7 +242,7 @@ class Heading:
 def heading_of(site: Site, deployment: Deployment, room: float) -> Heading:
     """Return the heading of a picture, ``room`` inches wide."""
     lines: list[str] = []
-    for part in summary_parts(deployment):
+    for part in _summary(deployment):
         joined = f"{lines[-1]}{SEPARATOR}{part}" if lines else part
         if lines and text_width(joined, RESULT_SIZE) <= room:
             lines[-1] = joined
@@ -227,26 +251,14 @@ def heading_of(site: Site, deployment: Deployment, room: float) -> Heading:
     return Heading(tuple(wrapped(site.name, room, NAME_SIZE, "bold")), tuple(lines))
 
 
-def draw_attribution(axes: Axes, attribution: Sequence[str]) -> None:
-    """Write the credits of a map's sources at its lower right corner, over what is drawn there."""
+def draw_attribution(axes: Axes, attribution: Sequence[str]) -> Window | None:
+    """Write the credits of a map's sources at its lower right corner, over what is drawn there; return their box."""
     if not attribution:
-        return
-    paper: Style = {"boxstyle": "square,pad=0.25", "facecolor": PAPER, "alpha": 0.85, "edgecolor": "none"}
-    style: Style = {
-        "ha": "right",
-        "va": "bottom",
-        "size": ATTRIBUTION_SIZE,
-        "color": INK,
-        "bbox": paper,
-        "parse_math": False,
-    }
-    axes.text(0.995, 0.005, "\n".join(attribution), transform=axes.transAxes, zorder=ATTRIBUTION_ORDER, **style)
-
-
-def credits_box(axes: Axes, attribution: Sequence[str]) -> tuple[float, float, float, float]:
-    """Return left, bottom, right and top of the credits of `draw_attribution`, in data coordinates."""
-    texts = [text for text in axes.texts if text.get_text() == "\n".join(attribution)]
-    extent = texts[-1].get_window_extent().padded(ATTRIBUTION_SIZE / 2 * axes.figure.dpi / 72)
+        return None
+    style: Style = {"ha": "right", "va": "bottom", "size": ATTRIBUTION_SIZE, "color": INK, "bbox": NOTE_PAPER}
+    style |= {"parse_math": False, "transform": axes.transAxes, "zorder": ATTRIBUTION_ORDER}
+    written = axes.text(0.995, 0.005, "\n".join(attribution), **style)
+    extent = written.get_window_extent().padded(ATTRIBUTION_SIZE / 2 * axes.figure.dpi / 72)
     (left, bottom), (right, top) = axes.transData.inverted().transform(extent.get_points())
     return left, bottom, right, top
 
@@ -256,12 +268,7 @@ def credits_of(site: Site, created: str) -> tuple[str, ...]:
     return (*site.attribution, *([f"Placement of {created[:10]}"] if created else []))
 
 
-def summary(deployment: Deployment) -> str:
-    """Return the result in one line."""
-    return SEPARATOR.join(summary_parts(deployment))
-
-
-def summary_parts(deployment: Deployment) -> list[str]:
+def _summary(deployment: Deployment) -> list[str]:
     """Return the result in parts: what is seen, and the price."""
     sensors = counted(len(deployment.sensors), "sensor sees", "sensors see")
     band = deployment.gain_band
@@ -274,8 +281,7 @@ def summary_parts(deployment: Deployment) -> list[str]:
             parts.append(f"{percent(deployment.central)} of its weighted part")
         parts.append(f"{percent(deployment.seen_twice)} seen twice")
     price = price_text(deployment.price, installed=deployment.installed)
-    parts.append(price if deployment.installed else f"{price} for sensors")
-    return parts
+    return [*parts, price if deployment.installed else f"{price} for sensors"]
 
 
 def percent(share: float) -> str:
@@ -286,37 +292,70 @@ def percent(share: float) -> str:
 
 
 def draw_callouts(  # as for `place_callouts`
-    axes: Axes, points: Float, words: list[str], road: Float, zorder: float, taken: Float | None = None
+    axes: Axes, points: Float, words: list[str], road: Float, zorder: float, taken: Sequence[Window] = ()
 ) -> None:
     """Write words next to points (k, 2), in data coordinates, off the road (t, 2) and each other where they can be.
 
-    No label is in a box of ``taken`` (n, 4): left, bottom, right and top.
+    No label is in a box of ``taken``.
     """
     if not len(points):
         return
     boxed = {"boxstyle": f"round,pad={LABEL_PADDING}", "facecolor": PAPER, "edgecolor": SOFT_INK, "linewidth": 0.6}
-    texts = [
-        axes.text(
-            0,
-            0,
-            label,
-            ha="center",
-            va="center",
-            size=LABEL_SIZE,
-            color=INK,
-            bbox=boxed,
-            zorder=zorder,
-            parse_math=False,
-        )
-        for label in words
-    ]
+    style: Style = {"ha": "center", "va": "center", "size": LABEL_SIZE, "color": INK, "bbox": boxed}
+    texts = [axes.text(0, 0, label, zorder=zorder, parse_math=False, **style) for label in words]
     point = axes.figure.dpi / 72
     extents = [text.get_window_extent() for text in texts]
     sizes = np.array([(extent.width, extent.height) for extent in extents]) + 2 * LABEL_PADDING * LABEL_SIZE * point
     anchors = axes.transData.transform(points)
-    boxes = None if taken is None else axes.transData.transform(taken.reshape(-1, 2)).reshape(-1, 4)
+    boxes = axes.transData.transform(np.reshape(taken, (-1, 2))).reshape(-1, 4)
     bounds = axes.get_window_extent().padded(-4.0 * point).extents
     centres = place_callouts(anchors, sizes, bounds, MARK_RADIUS * point, axes.transData.transform(road), boxes)
     for text, start, end in zip(texts, points, axes.transData.inverted().transform(centres), strict=True):
         text.set_position(end)
         axes.plot(*zip(start, end, strict=True), color=INK, linewidth=0.9, zorder=zorder - 0.1)
+
+
+def draw_corners(
+    axes: Axes, attribution: Sequence[str] = (), *, longest: float = 2.0, north: bool = True
+) -> list[Window]:
+    """Draw the scale, an arrow along +y and the credits in the corners of a map, and return what they cover.
+
+    Parameters
+    ----------
+    longest : float, inches
+        Largest length of the scale bar.
+    north : bool
+        Whether to draw the arrow; +y is north in map coordinates.
+    """
+    (left, right), (bottom, top) = axes.get_xlim(), axes.get_ylim()
+    inch = (right - left) * axes.figure.dpi / axes.bbox.width
+    papers = corner_boxes((left, bottom, right, top), inch, longest)[: 1 + north]
+    for low_x, low_y, high_x, high_y in papers:
+        paper: Style = {"facecolor": PAPER, "alpha": 0.9, "edgecolor": "none", "zorder": CORNER_ORDER}
+        axes.add_patch(Rectangle((low_x, low_y), high_x - low_x, high_y - low_y, **paper))
+    length, x, y = round_number(longest * inch), left + 0.25 * inch, bottom + 0.25 * inch
+    for part in range(4):
+        style: Style = {"facecolor": INK if part % 2 == 0 else PAPER, "edgecolor": INK, "linewidth": 0.7}
+        corner = (x + part * length / 4, y)
+        axes.add_patch(Rectangle(corner, length / 4, 0.08 * inch, zorder=CORNER_ORDER, **style))
+    unit, name = (1000.0, "km") if length >= 2000.0 else (1.0, "m")
+    style = {"ha": "center", "va": "bottom", "size": SCALE_SIZE, "color": INK, "zorder": CORNER_ORDER}
+    ends = ((0.0, "0"), (length / 2, f"{length / 2 / unit:g}"), (length, f"{length / unit:g} {name}"))
+    for at, words in ends if longest > 1.0 else ends[::2]:
+        axes.text(x + at, y + 0.13 * inch, words, **style)
+    if north:
+        x, y = right - 0.38 * inch, top - 0.82 * inch
+        arrow = np.array([(0.0, 0.42), (0.12, 0.0), (0.0, 0.09), (-0.12, 0.0)]) * inch + (x, y)
+        axes.fill(arrow[:, 0], arrow[:, 1], facecolor=INK, edgecolor="none", zorder=CORNER_ORDER)
+        axes.text(x, y + 0.46 * inch, "N", weight="bold", **style)
+    covered = draw_attribution(axes, attribution)
+    return [*papers, *([] if covered is None else [covered])]
+
+
+def corner_boxes(window: Window, inch: float, longest: float = 2.0) -> list[Window]:
+    """Return the boxes of the scale and of the north arrow on a map of a window; an inch of it is ``inch`` metres."""
+    left, bottom, right, top = window
+    x, y = left + 0.12 * inch, bottom + 0.13 * inch
+    scale = (x, y, x + (round_number(longest * inch) + 0.55 * inch), y + 0.52 * inch)
+    x, y = right - 0.62 * inch, top - 0.92 * inch
+    return [scale, (x, y, x + 0.48 * inch, y + 0.8 * inch)]

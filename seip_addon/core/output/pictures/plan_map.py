@@ -20,9 +20,9 @@ from ...geometry.plan import closed, outline
 from ...site.scene_geometry import ASSUMED, OTHER_LEVELS, Mesh, SceneGeometry
 from ...site.site import Site
 from ...site.target_squares import target_squares
-from .coverage_colours import of_placement
-from .drawing import MARK_RADIUS, Style, draw_polygons, is_writable, text_width
-from .palette import ASSUMED_POLE_COLOUR, FORBIDDEN, INK, MANDATORY, PAPER, POLE_COLOUR, SOFT_INK, WEIGHTED
+from .colours import of_placement
+from .drawing import MARK_RADIUS, Style, Window, draw_polygons, is_writable, text_width
+from .palette import ASSUMED_POLE_COLOUR, FORBIDDEN, INK, MANDATORY, PAPER, POLE_COLOUR, WEIGHTED
 
 ARROW_LENGTH, WEDGE_LENGTH = 0.34, 0.5  # inches
 LAND, PAVEMENT, ROAD, KERB = "#edefe9", "#e2dacb", "#dcdfe3", "#8f949a"
@@ -41,8 +41,6 @@ POLE_MARK: Style = {"linestyle": "none", "marker": "D", "markersize": 3.8, "mfc"
 ASSUMED_MARK: Style = POLE_MARK | {"mfc": PAPER, "mec": ASSUMED_POLE_COLOUR, "mew": 0.9}
 
 SURFACE, EDGE, TARGET, OBSTACLE, BORDER, CANDIDATE, TEXT, SENSOR = range(8)
-Window = tuple[float, float, float, float]
-"""Left, bottom, right and top of a part of the plane, metres."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,11 +69,12 @@ def map_content(geometry: SceneGeometry, site: Site, deployment: Deployment, win
 def draw_map(axes: Axes, content: MapContent, window: Window, width: float) -> None:
     """Draw the part of the plane in a window, without sensors; the axes are ``width`` inches wide."""
     geometry, site = content.geometry, content.site
-    axes.spines[:].set(color=SOFT_INK, linewidth=0.8)
-    axes.set(xlim=(window[0], window[2]), ylim=(window[1], window[3]), facecolor=LAND)
+    axes.set(facecolor=LAND)
     shown = shapely.box(*window)
     _draw_surfaces(axes, geometry, shown)
-    _draw_targets(axes, site, content.deployment)
+    shown_as = of_placement(content.deployment)
+    colours, squares = np.array(shown_as.colours)[shown_as.of], target_squares(site.targets)[:, :, :2]
+    draw_polygons(axes, squares, facecolors=colours, edgecolors="none", antialiaseds=False, zorder=TARGET)
     _draw_obstacles(axes, content, shown)
     _draw_areas(axes, geometry, site.region)
     _draw_candidates(axes, geometry, site)
@@ -95,7 +94,8 @@ def draw_street_names(
         if place.crossing or not is_writable(place.name):
             continue
         parts = [part for part in shapely.get_parts(place.polygon) if part.area > 0]
-        inside = [_largest(shapely.intersection(part, shapely.box(*window))) for part in parts]
+        cuts = [shapely.get_parts(shapely.intersection(part, shapely.box(*window))) for part in parts]
+        inside = [max(cut, key=lambda one: float(one.area), default=shapely.Polygon()) for cut in cuts]
         whole, shown = max(zip(parts, inside, strict=True), key=lambda both: float(both[1].area), default=(None, None))
         if whole is None or shown is None or shown.is_empty:
             continue
@@ -130,11 +130,6 @@ def mark_boxes(sensors: Float, inch: float) -> list[Window]:
     return [(x - half, y - half, x + half, y + half) for x, y in sensors.tolist()]
 
 
-def _largest(area: BaseGeometry) -> BaseGeometry:
-    """Return the largest part of an area, an empty polygon if there is none."""
-    return max(shapely.get_parts(area), key=lambda part: float(part.area), default=shapely.Polygon())
-
-
 def _direction(street: BaseGeometry) -> Float:
     """Return the direction of the longer side of the narrowest rectangle around a street, (2,)."""
     sides = np.diff(shapely.get_coordinates(shapely.minimum_rotated_rectangle(street)), axis=0)[:2]
@@ -159,13 +154,6 @@ def _footprint(mesh: Mesh, shown: BaseGeometry) -> BaseGeometry:
     return outline(mesh.triangles[near])
 
 
-def _draw_targets(plan: Axes, site: Site, deployment: Deployment) -> None:
-    shown = of_placement(deployment)
-    colours = np.array(shown.colours)[shown.of]
-    squares = target_squares(site.targets)[:, :, :2]
-    draw_polygons(plan, squares, facecolors=colours, edgecolors="none", antialiaseds=False, zorder=TARGET)
-
-
 def _obstacles(occluders: Sequence[Mesh], shown: BaseGeometry) -> Float:
     """Return the triangles (n, 3, 3) of obstacles that a part of the plane shows, the highest last."""
     triangles = np.concatenate([np.empty((0, 3, 3)), *(mesh.triangles for mesh in occluders)])
@@ -179,7 +167,10 @@ def _obstacles(occluders: Sequence[Mesh], shown: BaseGeometry) -> Float:
 
 def _above_road(site: Site, triangles: Float) -> Float:
     """Return the height of the top of each triangle (n, 3, 3) above the road next to it."""
-    height: Float = triangles[:, :, 2].max(axis=1) - _road_level(site, triangles.mean(axis=1))
+    targets = site.targets.xyz
+    middles = shapely.points(triangles.mean(axis=1)[:, :2])
+    nearest = shapely.STRtree(shapely.points(targets[:, :2])).nearest(middles)
+    height: Float = triangles[:, :, 2].max(axis=1) - targets[nearest, 2]
     return height
 
 
@@ -195,14 +186,6 @@ def _draw_obstacles(plan: Axes, content: MapContent, shown: BaseGeometry) -> Non
     for mesh in occluders:
         if mesh.height_assumed:
             draw_area(plan, _footprint(mesh, shown), **ASSUMED_HEIGHT, zorder=OBSTACLE)
-
-
-def _road_level(site: Site, points: Float) -> Float:
-    """Return the height of the road at the target next to each point."""
-    targets = site.targets.xyz
-    nearest = shapely.STRtree(shapely.points(targets[:, :2])).nearest(shapely.points(points[:, :2]))
-    level: Float = targets[nearest, 2]
-    return level
 
 
 def _draw_areas(plan: Axes, geometry: SceneGeometry, region: BaseGeometry) -> None:

@@ -13,24 +13,26 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from shapely.geometry.base import BaseGeometry
 
-from ...choosing.placement.deployment import Deployment, Sensor
+from ...choosing.placement.deployment import Deployment
 from ...counts import counted
 from ...site.scene_geometry import ASSUMED, FROM_MAP, OTHER_LEVELS, NamedArea, SceneGeometry
 from ...site.site import Site
-from .coverage_colours import of_placement
+from .colours import of_placement
 from .drawing import (
     SENSOR_MARK,
     Style,
+    Window,
     add_axes,
-    credits_box,
+    corner_boxes,
     credits_of,
-    draw_attribution,
+    draw_corners,
     draw_sensors,
     heading_of,
     markers_of,
     new_page,
     percent,
     save_png,
+    window_around,
     wrapped,
 )
 from .palette import FORBIDDEN, INK, MANDATORY, SOFT_INK, WEIGHTED
@@ -43,13 +45,11 @@ from .plan_map import (
     SENSOR,
     SIDEWALK_MARK,
     MapContent,
-    Window,
     draw_map,
     draw_street_names,
     map_content,
     mark_boxes,
 )
-from .scale_bar import draw_north, draw_scale, north_paper, scale_paper
 
 DPI = 160
 MARGIN = 0.3  # inches
@@ -60,6 +60,7 @@ MIN_MARGIN = 3.0  # metres, likewise
 ROOMS = (1.0, 1.03, 1.06, 1.1, 1.15, 1.2, 1.3, 1.4)  # by which more is shown until no corner's writing hides the region
 
 COLUMNS, COLUMN_GAP = 3, 0.35  # of the legend: number, and inches between two
+COLUMN = (MAP_WIDTH - (COLUMNS - 1) * COLUMN_GAP) / COLUMNS  # width, inches
 SIZE, SMALL, HEADING_SIZE = 10.0, 9.0, 11.5  # points
 LINE, SMALL_LINE, HEADING_LINE, AFTER = 0.23, 0.19, 0.4, 0.16  # inches
 TEXT_X, LABEL_X, SHARE_ROOM = 0.34, 0.78, 0.55  # inches: of text beside a mark, of a sensor's type, for its share
@@ -72,7 +73,7 @@ Sign = Callable[[Axes, float, float], object]
 """Draws a sign into axes in inches, at the left end and the middle of a row's first line."""
 
 
-def save_plan_view(  # what a plan shows
+def save_plan_view(
     path: str | os.PathLike[str],
     geometry: SceneGeometry,
     site: Site,
@@ -101,22 +102,16 @@ def draw_plan(
     """Return the plan as a figure."""
     sensors = np.array([sensor.xyz[:2] for sensor in deployment.sensors]).reshape(-1, 2)
     shown = shapely.union_all([site.region, *shapely.points(sensors)])
-    map_height = _map_height(shown)
-    window = _window(shown, map_height)
+    window, map_height = _window(shown)
     content = map_content(geometry, site, deployment, window)
-    heading, legend = heading_of(site, deployment, MAP_WIDTH), PlanLegend(content, MAP_WIDTH, notes)
+    heading, legend = heading_of(site, deployment, MAP_WIDTH), PlanLegend(content, notes)
     size = (MAP_WIDTH + 2 * MARGIN, heading.height + map_height + legend.height + 2 * MARGIN)
     figure = new_page(size, DPI)
     heading.draw(figure, MARGIN)
-    plan = add_axes(figure, MARGIN, legend.height + 2 * MARGIN, MAP_WIDTH, map_height)
+    plan = add_axes(figure, MARGIN, legend.height + 2 * MARGIN, MAP_WIDTH, map_height, window)
     draw_map(plan, content, window, MAP_WIDTH)
     inch = (window[2] - window[0]) / MAP_WIDTH
-    draw_scale(plan, inch)
-    draw_north(plan, inch)
-    credit = credits_of(site, created)
-    draw_attribution(plan, credit)
-    taken = [_corners(*paper) for paper in _papers(window)]
-    taken += [credits_box(plan, credit)] if credit else []
+    taken = draw_corners(plan, credits_of(site, created))
     names = draw_street_names(plan, geometry, window, MAP_WIDTH, [*taken, *mark_boxes(sensors, inch)])
     draw_sensors(
         plan,
@@ -124,56 +119,28 @@ def draw_plan(
         sensors,
         site.targets.xyz[:, :2],
         zorder=SENSOR,
-        taken=np.array([*taken, *names]).reshape(-1, 4),
+        taken=[*taken, *names],
     )
     legend.draw(add_axes(figure, MARGIN, MARGIN, MAP_WIDTH, legend.height))
     return figure
 
 
-def _map_height(shown: BaseGeometry) -> float:
-    """Return the height of the map on the page in inches, as near to the shape of what it shows as fits."""
-    _, _, width, height = _bounds(shown)
-    return min(max(MAP_WIDTH * height / width, MIN_MAP_HEIGHT), MAX_MAP_HEIGHT)
-
-
-def _window(shown: BaseGeometry, map_height: float) -> Window:
-    """Return the part of the plane to show: region and sensors with a margin, on a map of given height in inches.
+def _window(shown: BaseGeometry) -> tuple[Window, float]:
+    """Return the part of the plane to show, region and sensors with a margin, and the height of its map in inches.
 
     The margin is larger where the scale or the north arrow would hide part of the region.
     """
-    x, y, width, height = _bounds(shown)
-    shape = map_height / MAP_WIDTH
-    width, height = max(width, height / shape), max(height, width * shape)
-    windows = [
-        (x - room * width / 2, y - room * height / 2, x + room * width / 2, y + room * height / 2) for room in ROOMS
-    ]
-    papers = ([shapely.box(*_corners(*paper)) for paper in _papers(one)] for one in windows)
-    return next(
-        (
-            one
-            for one, covers in zip(windows, papers, strict=True)
-            if not any(shown.intersects(cover) for cover in covers)
-        ),
-        windows[0],
-    )
-
-
-def _papers(window: Window) -> list[Window]:
-    """Return left, bottom, width and height of scale and north arrow on a map."""
-    left, bottom, right, top = window
-    inch = (right - left) / MAP_WIDTH
-    return [scale_paper(left, bottom, inch), north_paper(right, top, inch)]
-
-
-def _corners(left: float, bottom: float, width: float, height: float) -> Window:
-    return left, bottom, left + width, bottom + height
-
-
-def _bounds(shown: BaseGeometry) -> tuple[float, float, float, float]:
-    """Return the middle, width and height of what is shown, with some room around it."""
     left, bottom, right, top = shown.bounds
-    around = 2 * max(MARGIN_SHARE * max(right - left, top - bottom), MIN_MARGIN)
-    return (left + right) / 2, (bottom + top) / 2, right - left + around, top - bottom + around
+    margin = max(MARGIN_SHARE * max(right - left, top - bottom), MIN_MARGIN)
+    first = window_around(shown.bounds, margin, (MIN_MAP_HEIGHT / MAP_WIDTH, MAX_MAP_HEIGHT / MAP_WIDTH))
+    x, y, width, height = first[0] + first[2], first[1] + first[3], first[2] - first[0], first[3] - first[1]
+    map_height = MAP_WIDTH * height / width
+    rooms = [(room * width, room * height) for room in ROOMS]
+    windows = [((x - wide) / 2, (y - high) / 2, (x + wide) / 2, (y + high) / 2) for wide, high in rooms]
+    for one in windows:
+        if not any(shown.intersects(shapely.box(*box)) for box in corner_boxes(one, (one[2] - one[0]) / MAP_WIDTH)):
+            return one, map_height
+    return windows[0], map_height
 
 
 @dataclass(frozen=True, eq=False)
@@ -194,37 +161,34 @@ class _Row:
     sign: Sign | None = None
     joined: bool = False
 
-    def draw(self, axes: Axes, x: float, y: float, width: float) -> None:
+    def draw(self, axes: Axes, x: float, y: float) -> None:
         if self.sign is not None:
             self.sign(axes, x, y)
         for left, down, words, style in self.texts:
             plain: Style = {"size": SIZE, "color": INK, "va": "center", "parse_math": False}
-            plain["ha"] = "right" if left > width else "left"
-            axes.text(x + min(left, width), y + down, words, **plain | style)
+            plain["ha"] = "right" if left > COLUMN else "left"
+            axes.text(x + min(left, COLUMN), y + down, words, **plain | style)
+
+    def followed_by(self, room: float) -> "_Row":
+        return replace(self, height=self.height + room)
 
 
 class PlanLegend:
-    """Legend of a plan, laid out in columns as low as its rows allow.
+    """Legend of a plan, `MAP_WIDTH` inches wide, laid out in columns as low as its rows allow; notes come last."""
 
-    Parameters
-    ----------
-    width : float, inches
-        Width of all columns together.
-    notes : sequence of str
-        Sentences below everything else.
-    """
-
-    def __init__(self, content: MapContent, width: float, notes: Sequence[str]) -> None:
-        self._column = (width - (COLUMNS - 1) * COLUMN_GAP) / COLUMNS
-        self._width = width
+    def __init__(self, content: MapContent, notes: Sequence[str]) -> None:
+        site, deployment = content.site, content.deployment
         sections = (
-            self._sensors(content.deployment),
-            self._targets(content.site, content.deployment),
-            self._map(content.geometry, content.site),
-            self._heights(content),
-            self._notes(notes),
+            _sensor_rows(deployment),
+            _target_rows(site, deployment),
+            _map_rows(content.geometry, site),
+            _height_rows(content),
+            [*([_heading("Notes")] if notes else []), *(_small(note[:1].upper() + note[1:]) for note in notes)],
         )
-        self._rows = [row for section in sections for row in _together(list(section))]
+        for rows in sections:
+            if len(rows) <= MOST_TOGETHER:
+                rows[:-1] = [replace(row, joined=True) for row in rows[:-1]]
+        self._rows = [row for rows in sections for row in rows]
         self.height = max(*map(self._tall, range(len(self._rows))), sum(row.height for row in self._rows) / COLUMNS)
         while len({column for column, _ in self._places()}) > COLUMNS:
             self.height += HEIGHT_STEP
@@ -232,9 +196,9 @@ class PlanLegend:
     def draw(self, axes: Axes) -> None:
         """Draw all rows into axes of the legend's width and height."""
         axes.axis("off")
-        axes.set(xlim=(0.0, self._width), ylim=(self.height, 0.0))
+        axes.set(xlim=(0.0, MAP_WIDTH), ylim=(self.height, 0.0))
         for row, (column, y) in zip(self._rows, self._places(), strict=True):
-            row.draw(axes, column * (self._column + COLUMN_GAP), y, self._column)
+            row.draw(axes, column * (COLUMN + COLUMN_GAP), y)
 
     def _tall(self, start: int) -> float:
         """Return the height of a row and of all that must stay below it in its column."""
@@ -251,16 +215,11 @@ class PlanLegend:
             y, follows = y + row.height, row.joined
         return places
 
-    def _sensors(self, deployment: Deployment) -> Iterator[_Row]:
-        if deployment.sensors:
-            yield self._heading("Sensors", "sees of the road")
-        markers = markers_of(deployment)
-        for sensor in deployment.sensors:
-            last = sensor is deployment.sensors[-1]
-            yield self._sensor(sensor, markers[sensor.model.key], AFTER if last else 0.0)
 
-    def _sensor(self, sensor: Sensor, marker: str, after: float) -> _Row:
-        room = self._column - LABEL_X
+def _sensor_rows(deployment: Deployment) -> list[_Row]:
+    markers, room = markers_of(deployment), COLUMN - LABEL_X
+    rows = []
+    for sensor in deployment.sensors:
         names = wrapped(sensor.model.name, room - SHARE_ROOM, SIZE)
         below = wrapped(f"{sensor.height:.3g} m high{sensor.turned}, {sensor.position_name}", room, SMALL)
         texts: list[tuple[float, float, str, Style]] = [
@@ -268,74 +227,70 @@ class PlanLegend:
             *((LABEL_X, number * LINE, line, {}) for number, line in enumerate(names)),
             *((LABEL_X, len(names) * LINE + n * SMALL_LINE - 0.02, line, ASIDE) for n, line in enumerate(below)),
         ]
-        sign = partial(_mark, SENSOR_MARK | {"marker": marker, "markersize": 8.0, "mew": 0.8})
-        return _Row(tuple(texts), len(names) * LINE + len(below) * SMALL_LINE + 0.04 + after, sign)
+        sign = partial(_mark, SENSOR_MARK | {"marker": markers[sensor.model.key], "markersize": 8.0, "mew": 0.8})
+        rows.append(_Row(tuple(texts), len(names) * LINE + len(below) * SMALL_LINE + 0.04, sign))
+    return [_heading("Sensors", "sees of the road"), *rows[:-1], rows[-1].followed_by(AFTER)] if rows else []
 
-    def _targets(self, site: Site, deployment: Deployment) -> Iterator[_Row]:
-        shown = of_placement(deployment)
-        yield self._heading(shown.title)
-        for words, colour, share in reversed(list(zip(shown.words, shown.colours, shown.shares, strict=True))):
-            yield self._line(words, partial(_swatch, {"facecolor": colour}), percent(share))
-        yield self._small(f"share of the road, in {counted(len(site.targets), 'square')} of {site.targets.spacing:g} m")
 
-    def _map(self, geometry: SceneGeometry, site: Site) -> Iterator[_Row]:
-        yield self._heading("Map")
-        swatches: list[tuple[str, Style]] = [("region of interest", {"edgecolor": INK, "linewidth": 1.1})]
-        if any(mesh.name.startswith(OTHER_LEVELS) for mesh in geometry.ground):
-            swatches.append(("road on another level", OTHER_ROAD))
-        dashed: Style = {"edgecolor": WEIGHTED, "linewidth": 1.4, "linestyle": (0, (4, 1.5))}
-        swatches += [(words, dashed) for words in _weighted(geometry.weighted_regions)]
-        if geometry.forbidden_areas:
-            swatches.append(("no sensor here", {"edgecolor": FORBIDDEN, "hatch": "////", "linewidth": 0.9}))
-        if geometry.mandatory_areas:
-            swatches.append(("at least one sensor here", {"edgecolor": MANDATORY, "hatch": "....", "linewidth": 0.9}))
-        rows = [self._line(words, partial(_swatch, {"facecolor": "none"} | style)) for words, style in swatches]
-        for count, mark, words in _positions(geometry, site):
-            if count:
-                larger = mark | {"markersize": mark["markersize"] * 1.4}
-                rows.append(self._line(words, partial(_mark, larger)))
-        yield from rows[:-1]
-        yield replace(rows[-1], height=rows[-1].height + AFTER)
+def _target_rows(site: Site, deployment: Deployment) -> list[_Row]:
+    shown = of_placement(deployment)
+    classes = reversed(list(zip(shown.words, shown.colours, shown.shares, strict=True)))
+    rows = [_line(words, partial(_swatch, {"facecolor": colour}), percent(share)) for words, colour, share in classes]
+    squares = f"share of the road, in {counted(len(site.targets), 'square')} of {site.targets.spacing:g} m"
+    return [_heading(shown.title), *rows, _small(squares)]
 
-    def _heights(self, content: MapContent) -> Iterator[_Row]:
-        yield self._heading("Obstacles", "height above the road")
-        assumed = any(mesh.height_assumed for mesh in content.geometry.occluders)
-        highest = float(content.heights.vmax or 0.0)
-        ticks = tuple(
-            (2.2 * share, 0.22, f"{highest * share:g}{unit}", {"ha": align, "size": SMALL})
-            for share, align, unit in ((0.0, "left", ""), (0.5, "center", ""), (1.0, "right", " m"))
-        )
-        yield _Row(ticks, 0.44 + AFTER * (not assumed), partial(_ramp, content.heights), joined=assumed)
-        if assumed:
-            row = self._line("height assumed", partial(_swatch, ASSUMED_HEIGHT))
-            yield replace(row, height=row.height + AFTER)
 
-    def _notes(self, notes: Sequence[str]) -> Iterator[_Row]:
-        if notes:
-            yield self._heading("Notes")
-        for note in notes:
-            yield self._small(note[:1].upper() + note[1:])
+def _map_rows(geometry: SceneGeometry, site: Site) -> list[_Row]:
+    swatches: list[tuple[str, Style]] = [("region of interest", {"edgecolor": INK, "linewidth": 1.1})]
+    if any(mesh.name.startswith(OTHER_LEVELS) for mesh in geometry.ground):
+        swatches.append(("road on another level", OTHER_ROAD))
+    dashed: Style = {"edgecolor": WEIGHTED, "linewidth": 1.4, "linestyle": (0, (4, 1.5))}
+    swatches += [(words, dashed) for words in _weighted(geometry.weighted_regions)]
+    if geometry.forbidden_areas:
+        swatches.append(("no sensor here", {"edgecolor": FORBIDDEN, "hatch": "////", "linewidth": 0.9}))
+    if geometry.mandatory_areas:
+        swatches.append(("at least one sensor here", {"edgecolor": MANDATORY, "hatch": "....", "linewidth": 0.9}))
+    rows = [_line(words, partial(_swatch, {"facecolor": "none"} | style)) for words, style in swatches]
+    for count, mark, words in _positions(geometry, site):
+        if count:
+            rows.append(_line(words, partial(_mark, mark | {"markersize": mark["markersize"] * 1.4})))
+    return [_heading("Map"), *rows[:-1], rows[-1].followed_by(AFTER)]
 
-    def _heading(self, words: str, aside: str = "") -> _Row:
-        lines = wrapped(words, self._column, HEADING_SIZE, "bold")
-        below = (len(lines) - 1) * LINE
-        texts = [(0.0, n * LINE, line, BOLD | {"size": HEADING_SIZE}) for n, line in enumerate(lines)]
-        return _Row((*texts, (np.inf, 0.0, aside, ASIDE)), HEADING_LINE + below, self._rule(below + 0.14), joined=True)
 
-    def _rule(self, down: float) -> Sign:
-        return lambda axes, x, y: axes.plot((x, x + self._column), (y + down,) * 2, color=SOFT_INK, linewidth=0.6)
+def _height_rows(content: MapContent) -> list[_Row]:
+    highest = float(content.heights.vmax or 0.0)
+    ticks = tuple(
+        (2.2 * share, 0.22, f"{highest * share:g}{unit}", {"ha": align, "size": SMALL})
+        for share, align, unit in ((0.0, "left", ""), (0.5, "center", ""), (1.0, "right", " m"))
+    )
+    rows = [_heading("Obstacles", "height above the road"), _Row(ticks, 0.44, partial(_ramp, content.heights))]
+    if any(mesh.height_assumed for mesh in content.geometry.occluders):
+        rows.append(_line("height assumed", partial(_swatch, ASSUMED_HEIGHT)))
+    return [*rows[:-1], rows[-1].followed_by(AFTER)]
 
-    def _line(self, words: str, sign: Sign, share: str = "") -> _Row:
-        """Return a row with a sign on the left, words, and a share on the right."""
-        lines = wrapped(words, self._column - TEXT_X - (SHARE_ROOM if share else 0.0), SIZE)
-        texts: list[tuple[float, float, str, Style]] = [(TEXT_X, n * LINE, line, {}) for n, line in enumerate(lines)]
-        return _Row((*texts, (np.inf, 0.0, share, BOLD)), len(lines) * LINE, sign)
 
-    def _small(self, words: str) -> _Row:
-        lines = wrapped(words, self._column, SMALL)
-        return _Row(
-            tuple((0.0, n * SMALL_LINE, line, ASIDE) for n, line in enumerate(lines)), len(lines) * SMALL_LINE + AFTER
-        )
+def _heading(words: str, aside: str = "") -> _Row:
+    lines = wrapped(words, COLUMN, HEADING_SIZE, "bold")
+    below = (len(lines) - 1) * LINE
+
+    def rule(axes: Axes, x: float, y: float) -> None:
+        axes.plot((x, x + COLUMN), (y + below + 0.14,) * 2, color=SOFT_INK, linewidth=0.6)
+
+    texts = [(0.0, n * LINE, line, BOLD | {"size": HEADING_SIZE}) for n, line in enumerate(lines)]
+    return _Row((*texts, (np.inf, 0.0, aside, ASIDE)), HEADING_LINE + below, rule, joined=True)
+
+
+def _line(words: str, sign: Sign, share: str = "") -> _Row:
+    """Return a row with a sign on the left, words, and a share on the right."""
+    lines = wrapped(words, COLUMN - TEXT_X - (SHARE_ROOM if share else 0.0), SIZE)
+    texts: list[tuple[float, float, str, Style]] = [(TEXT_X, n * LINE, line, {}) for n, line in enumerate(lines)]
+    return _Row((*texts, (np.inf, 0.0, share, BOLD)), len(lines) * LINE, sign)
+
+
+def _small(words: str) -> _Row:
+    lines = wrapped(words, COLUMN, SMALL)
+    texts = tuple((0.0, n * SMALL_LINE, line, ASIDE) for n, line in enumerate(lines))
+    return _Row(texts, len(lines) * SMALL_LINE + AFTER)
 
 
 def _mark(style: Style, axes: Axes, x: float, y: float) -> None:
@@ -349,13 +304,6 @@ def _swatch(style: Style, axes: Axes, x: float, y: float) -> None:
 def _ramp(norm: Normalize, axes: Axes, x: float, y: float) -> None:
     ramp = HEIGHT_CMAP(norm(np.linspace(0.0, float(norm.vmax or 0.0), 128)[None, :]))
     axes.imshow(ramp, extent=(x, x + 2.2, y + 0.1, y - 0.06), aspect="auto", interpolation="nearest")
-
-
-def _together(rows: list[_Row]) -> list[_Row]:
-    """Return the rows of a section, all in one column unless there are too many."""
-    if len(rows) > MOST_TOGETHER:
-        return rows
-    return [replace(row, joined=row is not rows[-1]) for row in rows]
 
 
 def _weighted(regions: Sequence[NamedArea]) -> Iterator[str]:

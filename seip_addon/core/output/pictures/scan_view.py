@@ -14,11 +14,22 @@ from shapely.geometry.base import BaseGeometry
 from ...counts import counted
 from ...sensing.scans.frame import Frame, Labels
 from ...sensing.scans.sensor import MountedSensor
-from .cloud_colours import By, cloud_colours, sensor_colour, strength_ramp
-from .drawing import LABEL_SIZE, SENSOR_MARK, Style, add_axes, box_corners, draw_attribution, draw_polygons, save_png
+from .chart_style import plain_legend
+from .colours import By, cloud_colours, sensor_colour, strength_ramp
+from .drawing import (
+    LABEL_SIZE,
+    SENSOR_MARK,
+    Style,
+    add_axes,
+    box_corners,
+    draw_corners,
+    draw_polygons,
+    new_page,
+    save_png,
+    window_around,
+)
 from .palette import INK, MAX_INTENSITY, PAPER, SEEN_COLOURS, SOFT_INK
 from .plan_map import draw_area
-from .scale_bar import draw_scale
 
 DPI = 160
 MAP_SIDE, MARGIN, HEAD, FOOT = 8.0, 0.3, 0.95, 0.55  # inches
@@ -47,20 +58,20 @@ def save_scan_view(
         Credits that the sources of the scene demand.
     """
     west, south, east, north = region.bounds
-    left, bottom, right, top = region.buffer(MARGIN_SHARE * max(east - west, north - south)).bounds
+    window = window_around(region.bounds, MARGIN_SHARE * max(east - west, north - south))
+    left, bottom, right, top = window
     tall = MAP_SIDE * (top - bottom) / (right - left)
-    figure = Figure((2 * MAP_SIDE + 3 * MARGIN, tall + HEAD + FOOT), dpi=DPI, facecolor=PAPER)
-    by_kind: tuple[By, ...] = ("sensor", "intensity")
-    for number, by in enumerate(by_kind):
-        axes = add_axes(figure, MARGIN + number * (MAP_SIDE + MARGIN), FOOT, MAP_SIDE, tall)
-        axes.set(xlim=(left, right), ylim=(bottom, top), facecolor=BACKGROUND_COLOUR)
+    figure = new_page((2 * MAP_SIDE + 3 * MARGIN, tall + HEAD + FOOT), DPI)
+    kinds: tuple[By, ...] = ("sensor", "intensity")
+    for number, by in enumerate(kinds):
+        axes = add_axes(figure, MARGIN + number * (MAP_SIDE + MARGIN), FOOT, MAP_SIDE, tall, window)
+        axes.set(facecolor=BACKGROUND_COLOUR)
         _draw_points(axes, frame.points, cloud_colours(frame, by)[:, :3])
         draw_area(axes, region, facecolor="none", edgecolor=SOFT_INK, linewidth=0.9)
         _draw_boxes(axes, frame.labels)
         colours = [sensor_colour(one) if by == "sensor" else PAPER for one in range(len(sensors))]
         _draw_sensors(axes, sensors, colours)
-        draw_scale(axes, (right - left) / MAP_SIDE)
-    draw_attribution(figure.axes[-1], attribution)
+        draw_corners(axes, attribution if number else (), north=False)
     _write_around(figure, frame, sensors)
     save_png(path, figure)
 
@@ -107,11 +118,7 @@ def _write_around(figure: Figure, frame: Frame, sensors: Sequence[MountedSensor]
     shown = range(len(sensors))
     marks = [Line2D([], [], color=sensor_colour(number), marker="o", linestyle="none") for number in shown]
     types = [f"{sensor.label}  {sensor.model.short_name}" for sensor in sensors]
-    legend = figure.legend(
-        marks, types, loc="lower left", bbox_to_anchor=(MARGIN / width, 0.0), frameon=False, ncols=8, fontsize=9
-    )
-    for text in legend.get_texts():
-        text.set_parse_math(False)
+    plain_legend(figure, marks, types, loc="lower left", bbox_to_anchor=(MARGIN / width, 0.0), ncols=8)
     bar = figure.add_axes(((2 * MARGIN + MAP_SIDE) / width, 0.3 / height, 3.0 / width, 0.12 / height))
     bar.imshow(strength_ramp(np.linspace(0.0, 1.0, 256))[None], aspect="auto", extent=(0, 1, 0, 1))
     shares = np.array([0.0, 0.05, 0.25, 1.0])
@@ -120,13 +127,6 @@ def _write_around(figure: Figure, frame: Frame, sensors: Sequence[MountedSensor]
     bar.set_xticklabels(words, size=8, color=INK)
     bar.set_title("intensity", size=8, color=INK, pad=2)
     boxes = [Line2D([], [], color=colour, linewidth=1.5) for colour in (SEEN_COLOUR, UNSEEN_COLOUR)]
-    figure.legend(
-        boxes,
-        ["road user with returns", "without a return"],
-        loc="lower right",
-        bbox_to_anchor=(1 - MARGIN / width, 0.0),
-        facecolor=BACKGROUND_COLOUR,
-        labelcolor=SEEN_COLOUR,
-        ncols=2,
-        fontsize=9,
-    )
+    dark: Style = {"frameon": True, "facecolor": BACKGROUND_COLOUR, "labelcolor": SEEN_COLOUR, "ncols": 2}
+    right: Style = {"loc": "lower right", "bbox_to_anchor": (1 - MARGIN / width, 0.0)}
+    plain_legend(figure, boxes, ["road user with returns", "without a return"], **dark, **right)

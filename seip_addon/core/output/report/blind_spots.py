@@ -20,15 +20,7 @@ MIN_DISTANCE = 0.5  # metres from a centre from which on there is a direction fr
 
 @dataclass(frozen=True, eq=False)
 class Centre:
-    """A point from which distances and directions are counted.
-
-    Parameters
-    ----------
-    name : str
-        What it is the centre of, in words.
-    xy : (2,) float64, metres
-        Local.
-    """
+    """A point (2,), local metres, from which distances and directions are counted, by what it is the centre of."""
 
     name: str
     xy: Float
@@ -36,17 +28,9 @@ class Centre:
 
 @dataclass(frozen=True, eq=False)
 class BlindSpot:
-    """A connected part of the road that no sensor sees.
+    """A connected part of the road that no sensor sees: its targets (n,), area in square metres, and place in words.
 
-    Parameters
-    ----------
-    targets : (n,) int64
-        Indices of the targets in it.
-    middle : (3,) float64, metres
-        The one of these that is nearest to their mean, local.
-    area : float, square metres
-    where : str
-        In words.
+    ``middle`` (3,) is the target that is nearest to their mean, local metres.
     """
 
     targets: Integer
@@ -66,14 +50,7 @@ class SeenPlace:
 
 
 def blind_spots(targets: Targets, seen: Boolean, areas: Sequence[Area]) -> list[BlindSpot]:
-    """Return the connected unseen parts of the road, the largest first.
-
-    Targets are connected where their squares share a side.
-
-    Parameters
-    ----------
-    seen : (t,) bool
-    """
+    """Return the connected unseen parts of the road, the largest first; squares that share a side are connected."""
     unseen = np.flatnonzero(~seen)
     labels = _components(np.round((targets.xyz[unseen, :2] - targets.xyz[:, :2].min(axis=0)) / targets.spacing))
     spots = []
@@ -86,13 +63,7 @@ def blind_spots(targets: Targets, seen: Boolean, areas: Sequence[Area]) -> list[
 
 
 def seen_places(targets: Targets, seen_by: Integer, areas: Sequence[Area]) -> list[SeenPlace]:
-    """Return what is seen of each named area; areas may overlap.
-
-    Parameters
-    ----------
-    seen_by : (t,) int64
-        Number of sensors that see each target.
-    """
+    """Return what is seen of each named area, by the number of sensors that see each target; areas may overlap."""
     return [_seen(area.name, area.within, targets, seen_by) for area in areas if area.within.any()]
 
 
@@ -100,12 +71,8 @@ def seen_streets(targets: Targets, seen_by: Integer, areas: Sequence[Area]) -> l
     """Return what is seen of each part of the road, and of all of it at the end.
 
     Each target belongs to one part: to the first weighted region that contains it, otherwise to the first street, or,
-    where no street is named, to the road towards one side. Areas and shares therefore add up.
-
-    Parameters
-    ----------
-    areas : sequence of Area
-        Weighted regions and streets, without crossings.
+    if no street is named, to the road towards one side. Areas and shares therefore add up. ``areas`` are weighted
+    regions and streets, without crossings.
     """
     streets = [(area.name, area.within) for area in areas if area.kind == PLACE]
     if not streets:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 
@@ -28,16 +29,7 @@ class Code:
 
 @dataclass(frozen=True)
 class Table:
-    """Table of few and narrow columns, which fit a phone; the columns in ``numbers`` hold numbers, on the right.
-
-    Parameters
-    ----------
-    head : tuple of str
-    rows : tuple of tuple of str
-        Each as long as the head.
-    numbers : frozenset of int
-        Columns, from 0.
-    """
+    """Table of few and narrow columns, which fit a phone; the columns in ``numbers``, from 0, are aligned right."""
 
     head: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
@@ -46,13 +38,7 @@ class Table:
 
 @dataclass(frozen=True)
 class Facts:
-    """Names with their values, one below the other.
-
-    Parameters
-    ----------
-    large : bool
-        Whether these are the key figures of the report.
-    """
+    """Names with their values, one below the other; large if these are the key figures of the report."""
 
     rows: tuple[tuple[str, str], ...]
     large: bool = False
@@ -60,13 +46,7 @@ class Facts:
 
 @dataclass(frozen=True)
 class Picture:
-    """A picture as PNG.
-
-    Parameters
-    ----------
-    tall : bool
-        Whether it may fill a page.
-    """
+    """A picture as PNG; a tall one may fill a page."""
 
     png: bytes
     caption: str
@@ -75,13 +55,7 @@ class Picture:
 
 @dataclass(frozen=True)
 class Pictures:
-    """Pictures of one size side by side, or one below the other on a phone.
-
-    Parameters
-    ----------
-    about : str
-        What they show, for those who cannot see them.
-    """
+    """Pictures of one size side by side, or one below the other on a phone; ``about`` is for those who cannot see."""
 
     pngs: tuple[bytes, ...]
     about: str
@@ -106,16 +80,17 @@ class Section:
     blocks: tuple[Block, ...]
 
 
+def make_sections(contents: Mapping[str, Iterable[Block]]) -> tuple[Section, ...]:
+    """Return sections by their titles, without empty ones."""
+    sections = (Section(title, tuple(blocks)) for title, blocks in contents.items())
+    return tuple(section for section in sections if section.blocks)
+
+
 @dataclass(frozen=True)
 class Report:
-    """A report.
+    """A report with the content of its first page.
 
-    Parameters
-    ----------
-    created : str
-        Time of the placement (ISO 8601), "" if unknown; the time of the report is not recorded.
-    first : tuple of Block
-        Content of the first page.
+    ``created`` is the time of the placement (ISO 8601), "" if unknown; the time of the report is not recorded.
     """
 
     title: str

@@ -14,7 +14,7 @@ from PIL import Image
 from ...arrays import Boolean, Integer
 from ...errors import SeipError
 from ...geometry.geo_reference import GeoReference
-from ..pictures.close_up_sheet import close_ups
+from ..pictures.close_ups import close_ups
 from ..results.file_names import (
     POSE_ERROR_PICTURES,
     TRAFFIC_PICTURES,
@@ -22,10 +22,10 @@ from ..results.file_names import (
     VERIFICATION_FOLDER,
     VERIFICATION_PICTURES,
 )
-from ..results.placement_file import load_placement
-from ..results.placement_record import PlacementRecord, RecordedSensor
+from ..results.placement_record import PlacementRecord, RecordedSensor, load_placement
 from ..results.site_file import SiteFile, load_site_file
 from ..results.verification_record import VerificationRecord, load_verification
+from .blind_spots import Centre, centres
 
 PICTURES = ("view.png", "plan.png")
 CLOSE_UPS = "sensors.png"
@@ -41,11 +41,11 @@ class Evidence:
     Parameters
     ----------
     pictures : mapping of str to bytes
-        PNG by file name, those that are there.
+        Existing pictures as PNG by file name, those of a verification included.
     close_ups : tuple of tuple of bytes
-        For each sensor, or for the first ones, its plan and its view as PNG, those that are there.
+        Existing close-ups as PNG of each sensor, or of the first ones: plan and view.
     verification : VerificationRecord or None
-        Its installation compared with the plan, if it was verified; its pictures are among the others.
+        Installation compared with the plan, if it was verified.
     """
 
     record: PlacementRecord
@@ -76,6 +76,11 @@ class Evidence:
         return len(self.site.targets) * self.site.targets.spacing**2
 
     @property
+    def centres(self) -> list[Centre]:
+        """Points from which places on the road are counted; see `centres`."""
+        return centres(self.site.targets, self.site.areas)
+
+    @property
     def geo_reference(self) -> GeoReference:
         """Georeference of the map."""
         known = self.record.site.geo_reference
@@ -100,7 +105,7 @@ def load_evidence(folder: Path) -> Evidence:
         raise SeipError(f"{folder} holds files of different placements: place the sensors again")
     if not _agree(record, site):
         raise SeipError(f"placement.json and site.npz in {folder} contradict each other: place the sensors again")
-    names = [*PICTURES]
+    names = list(PICTURES)
     names += POSE_ERROR_PICTURES if record.request.goal.scenarios.errs else ()
     names += TRAFFIC_PICTURES if record.request.goal.scenarios.kind == "traffic" else ()
     pictures = {name: _picture(folder / name) for name in names if (folder / name).is_file()}
@@ -108,7 +113,13 @@ def load_evidence(folder: Path) -> Evidence:
     if verification is not None:
         paths = [folder / VERIFICATION_FOLDER / name for name in VERIFICATION_PICTURES]
         pictures |= {path.name: _picture(path, "verify the installation again") for path in paths if path.is_file()}
-    return Evidence(record, site, pictures, _close_ups(folder / CLOSE_UPS, len(record.sensors)), verification)
+    sheet, shown = folder / CLOSE_UPS, []
+    try:
+        if sheet.is_file() and record.sensors:
+            shown = close_ups(_picture(sheet), len(record.sensors))
+    except ValueError as error:
+        raise SeipError(f"{sheet} is of another placement: place the sensors again") from error
+    return Evidence(record, site, pictures, tuple(shown), verification)
 
 
 def _agree(record: PlacementRecord, site: SiteFile) -> bool:
@@ -134,16 +145,6 @@ def _verification(folder: Path, record: PlacementRecord) -> VerificationRecord |
         if plan is None or plan.sensor != one.sensor or math.dist(plan.local_m, one.planned_m) > SAME_PLACE:
             raise SeipError(f"{path} is of another placement: verify the installation again, or move {folder} away")
     return found
-
-
-def _close_ups(path: Path, count: int) -> tuple[tuple[bytes, ...], ...]:
-    """Return the pictures of each sensor on a sheet; none where there is no such file."""
-    if not path.is_file() or not count:
-        return ()
-    try:
-        return tuple(close_ups(_picture(path), count))
-    except ValueError as error:
-        raise SeipError(f"{path} is of another placement: place the sensors again") from error
 
 
 def _picture(path: Path, cure: str = "place the sensors again") -> bytes:

@@ -9,14 +9,22 @@ from matplotlib.colors import ListedColormap
 
 from ...arrays import Float
 from ..pictures.chart_style import new_figure, style_axes
-from ..pictures.drawing import Style, as_png, draw_attribution, draw_callouts, new_page
+from ..pictures.drawing import (
+    Style,
+    add_axes,
+    as_png,
+    draw_callouts,
+    draw_corners,
+    new_page,
+    window_around,
+)
 from ..pictures.palette import INK, PAPER, SEEN_COLOURS, SOFT_INK
-from ..pictures.scale_bar import draw_north, draw_scale, north_paper, scale_paper
 from .blind_spots import BlindSpot
 from .evidence import Evidence
 
 DPI = 150
-MAP_WIDTH, MIN_MAP_HEIGHT, MAX_MAP_HEIGHT = 7.2, 4.0, 8.0  # inches
+MAP_WIDTH = 7.2  # inches
+MAP_SHAPES = (4.0 / MAP_WIDTH, 8.0 / MAP_WIDTH)  # least and largest height, in widths
 MARGIN = 6.0  # metres around the road
 CHART_SIZE = (7.2, 3.6)  # inches
 NUMBER_SIZE = 10.0  # points
@@ -28,12 +36,11 @@ def blind_spot_map(evidence: Evidence, spots: Sequence[BlindSpot]) -> bytes:
     targets = evidence.site.targets
     x, y = targets.xyz[:, 0], targets.xyz[:, 1]
     sensors = np.array([sensor.local_m[:2] for sensor in evidence.sensors]).reshape(-1, 2)
-    window = _window(np.vstack((targets.xyz[:, :2], sensors)))
+    points = np.vstack((targets.xyz[:, :2], sensors))
+    window = window_around((*points.min(axis=0).tolist(), *points.max(axis=0).tolist()), MARGIN, MAP_SHAPES)
     page = (MAP_WIDTH, MAP_WIDTH * (window[3] - window[1]) / (window[2] - window[0]))
     figure = new_page(page, DPI)
-    axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
-    axes.set(xticks=(), yticks=())
-    axes.spines[:].set(color=SOFT_INK, linewidth=0.8)
+    axes = add_axes(figure, 0.0, 0.0, *page, window)
 
     column = np.round((x - x.min()) / targets.spacing).astype(np.int64)
     row = np.round((y - y.min()) / targets.spacing).astype(np.int64)
@@ -43,34 +50,18 @@ def blind_spot_map(evidence: Evidence, spots: Sequence[BlindSpot]) -> bytes:
     frame = (x.min() - half, x.max() + half, y.min() - half, y.max() + half)
     style: Style = {"cmap": ListedColormap(SEEN_COLOURS), "vmin": 0, "vmax": 2, "interpolation": "nearest"}
     axes.imshow(cells, origin="lower", extent=frame, aspect="auto", **style)
-    axes.set(xlim=(window[0], window[2]), ylim=(window[1], window[3]))
-    inch = (window[2] - window[0]) / MAP_WIDTH
-    draw_scale(axes, inch)
-    draw_north(axes, inch)
-    draw_attribution(axes, evidence.record.site.attribution)
-    papers = (scale_paper(window[0], window[1], inch), north_paper(window[2], window[3], inch))
-    taken = [(left, bottom, left + width, bottom + height) for left, bottom, width, height in papers]
-    middles = np.array([spot.middle[:2] for spot in spots])
-    room = 0.12 * inch
-    taken += [(*(middle - room), *(middle + room)) for middle in middles]
+    axes.set(xlim=(window[0], window[2]), ylim=(window[1], window[3]))  # which the image has changed
+    taken = draw_corners(axes, evidence.record.site.attribution)
+    middles, inch = np.array([spot.middle[:2] for spot in spots]), (window[2] - window[0]) / MAP_WIDTH
+    taken += [(*(middle - 0.12 * inch), *(middle + 0.12 * inch)) for middle in middles]
     axes.plot(*sensors.T, linestyle="none", marker="^", markersize=10, mfc=INK, mec=PAPER, mew=1.2, zorder=4.0)
     labels = [sensor.id for sensor in evidence.sensors]
-    draw_callouts(axes, sensors, labels, targets.xyz[:, :2], 3.0, np.array(taken))
+    draw_callouts(axes, sensors, labels, targets.xyz[:, :2], 3.0, taken)
     circle: Style = {"boxstyle": "circle,pad=0.22", "facecolor": PAPER, "edgecolor": INK, "linewidth": 1.2}
     style = {"ha": "center", "va": "center", "size": NUMBER_SIZE, "weight": "bold", "color": INK, "zorder": 5.0}
     for number, (right, up) in enumerate(_apart(middles, 0.24 * inch).tolist(), start=1):
         axes.text(right, up, str(number), bbox=circle, **style)
     return as_png(figure)
-
-
-def _window(points: Float) -> tuple[float, float, float, float]:
-    """Return left, bottom, right and top of a map of points (n, 2) that fits the page."""
-    low, high = points.min(axis=0) - MARGIN, points.max(axis=0) + MARGIN
-    width, height = (high - low).tolist()
-    width = max(width, MAP_WIDTH / MAX_MAP_HEIGHT * height)
-    height = max(height, MIN_MAP_HEIGHT / MAP_WIDTH * width)
-    x, y = ((low + high) / 2).tolist()
-    return x - width / 2, y - height / 2, x + width / 2, y + height / 2
 
 
 def _apart(points: Float, distance: float) -> Float:
@@ -100,15 +91,9 @@ def front_chart(
     ----------
     rows : sequence of (int, float, float)
         Number of sensors, value of the best placement found for it, and the largest amount by which the value of
-        another placement could be larger.
-    placed : (int, float)
-        Number of sensors and value of the placement itself.
-    label : str
-        Label of the axis.
-    text : callable
-        Function that returns a value as text.
-    high : float
-        Upper end of the axis.
+        another placement could be larger; ``placed`` has the first two of the placement itself.
+    label, text, high
+        Label of the axis of values, function that returns a value as text, and upper end of the axis.
     """
     counts, values, more = zip(*rows, strict=True)
     figure, (axes,) = new_figure(*CHART_SIZE, dpi=DPI)

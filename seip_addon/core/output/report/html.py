@@ -101,40 +101,32 @@ def _blocks(blocks: Iterable[Block]) -> str:
 def _block(block: Block) -> str:
     if isinstance(block, Paragraph | Code):
         tag = "p" if isinstance(block, Paragraph) else "code"
-        return f"<{tag}>{_shown(block.text)}</{tag}>"
-    if isinstance(block, Bullets):
-        return "<ul>\n" + "\n".join(f"<li>{_shown(line)}</li>" for line in block.lines) + "\n</ul>"
-    if isinstance(block, Facts):
-        return _facts(block)
-    if isinstance(block, Card):
-        return f'<div class="card">\n<h3>{_shown(block.title)}</h3>\n{_blocks(block.blocks)}\n</div>'
-    return _table(block) if isinstance(block, Table) else _figure(block)
-
-
-def _facts(facts: Facts) -> str:
-    rows = "\n".join(f"<dt>{_shown(name)}</dt><dd>{_shown(value)}</dd>" for name, value in facts.rows)
-    kind = ' class="large"' if facts.large else ""
-    return f"<dl{kind}>\n{rows}\n</dl>"
-
-
-def _figure(block: Picture | Pictures) -> str:
-    if isinstance(block, Picture):
+        html = f"<{tag}>{_shown(block.text)}</{tag}>"
+    elif isinstance(block, Bullets):
+        html = "<ul>\n" + "\n".join(f"<li>{_shown(line)}</li>" for line in block.lines) + "\n</ul>"
+    elif isinstance(block, Facts):
+        rows = "\n".join(f"<dt>{_shown(name)}</dt><dd>{_shown(value)}</dd>" for name, value in block.rows)
+        kind = ' class="large"' if block.large else ""
+        html = f"<dl{kind}>\n{rows}\n</dl>"
+    elif isinstance(block, Card):
+        html = f'<div class="card">\n<h3>{_shown(block.title)}</h3>\n{_blocks(block.blocks)}\n</div>'
+    elif isinstance(block, Picture):
         kind = ' class="tall"' if block.tall else ""
         caption = f"<figcaption>{_shown(block.caption)}</figcaption>"
-        return f"<figure{kind}>{_image(block.png, block.caption)}{caption}</figure>"
-    images = "".join(_image(png, block.about) for png in block.pngs)
-    return f'<figure><div class="pair">{images}</div></figure>'
+        html = f"<figure{kind}>{_image(block.png, block.caption)}{caption}</figure>"
+    elif isinstance(block, Pictures):
+        images = "".join(_image(png, block.about) for png in block.pngs)
+        html = f'<figure><div class="pair">{images}</div></figure>'
+    else:
+        inner = "\n".join(_row(block, row, "td") for row in block.rows)
+        head = _row(block, block.head, "th")
+        html = f"<table>\n<thead>\n{head}\n</thead>\n<tbody>\n{inner}\n</tbody>\n</table>"
+    return html
 
 
 def _image(png: bytes, caption: str) -> str:
     source = f"data:image/png;base64,{base64.b64encode(png).decode('ascii')}"
     return f'<img src="{source}" alt="{_shown(caption)}">'
-
-
-def _table(table: Table) -> str:
-    head = _row(table, table.head, "th")
-    rows = "\n".join(_row(table, row, "td") for row in table.rows)
-    return f"<table>\n<thead>\n{head}\n</thead>\n<tbody>\n{rows}\n</tbody>\n</table>"
 
 
 def _row(table: Table, cells: tuple[str, ...], tag: str) -> str:

@@ -6,16 +6,20 @@ import io
 import logging
 from collections.abc import Callable, Sequence
 from datetime import datetime
+from functools import partial
 from pathlib import Path
-from typing import cast
+from typing import Any, cast
 
 import matplotlib as mpl
 from fpdf import FPDF, FontFace
 from fpdf.enums import Align, TableBordersLayout, VAlign, XPos, YPos
 from PIL import Image
 
+from ...storage.files import whole_file
 from ..pictures.palette import INK, PAPER, SOFT_INK
+from ..results.file_names import REPORT_FILES
 from .blocks import Block, Bullets, Card, Code, Facts, Paragraph, Picture, Pictures, Report, Section, Table
+from .html import as_html
 
 MARGIN, TOP, BOTTOM = 50.0, 52.0, 56.0
 BODY, SMALL, CARD_TITLE, LARGE, HEADING, TITLE = 9.5, 8.0, 10.5, 10.5, 14.0, 20.0
@@ -37,6 +41,14 @@ FONTS = {(TEXT, ""): "DejaVuSans", (TEXT, "B"): "DejaVuSans-Bold", (MONO, ""): "
 """Files of the type, which Matplotlib brings, by family and style."""
 
 
+def save_report(folder: Path, report: Report) -> tuple[Path, ...]:
+    """Write ``report.html`` and ``report.pdf``, and return their paths."""
+    for name, content in zip(REPORT_FILES, (as_html(report).encode(), as_pdf(report)), strict=True):
+        with whole_file(folder / name) as temporary:
+            temporary.write_bytes(content)
+    return tuple(folder / name for name in REPORT_FILES)
+
+
 def as_pdf(report: Report) -> bytes:
     """Return the report as a PDF file.
 
@@ -48,11 +60,10 @@ def as_pdf(report: Report) -> bytes:
     pdf.set_creation_date(datetime.fromisoformat(report.created) if report.created else None)
     pdf.add_page()
     for highest in FIRST_PICTURE_HEIGHTS:
-        with pdf.offset_rendering() as trial:
-            _add_first(cast("_Document", trial), report, highest)
-        if not trial.page_break_triggered:
+        add = partial(_add_first, report=report, highest=highest)
+        if pdf.has_room(add):
             break
-    _add_first(pdf, report, highest)
+    add(pdf)
     for number, section in enumerate(report.sections):
         if number == 0:
             pdf.add_page()
@@ -87,26 +98,46 @@ class _Document(FPDF):
         self.cell(room, SMALL, title if title == self._footer_title else f"{title} …")
         self.cell(60.0, SMALL, f"{self.page_no()} / {{nb}}", align="R")
 
-    def text_lines(
-        self, text: str, size: float, *, style: str = "", color: str = INK, indent: float = 0.0, family: str = TEXT
+    def text_lines(  # how text looks
+        self,
+        text: str,
+        size: float,
+        *,
+        style: str = "",
+        color: str = INK,
+        indent: float = 0.0,
+        family: str = TEXT,
+        **more: Any,  # noqa: ANN401  # fpdf2's own
     ) -> None:
         """Write text in the width of the page, or from an indent on, and go to the next line."""
         self.set_font(family, style, size)
         self.set_text_color(color)
         self.set_x(MARGIN + indent)
-        self.multi_cell(0, size * LEADING, text, align="L", new_x=XPos.LMARGIN, new_y=YPos.NEXT)
+        self.multi_cell(0, size * LEADING, text, align="L", new_x=XPos.LMARGIN, new_y=YPos.NEXT, **more)
 
-    def rule(self) -> None:
-        """Draw a line across the page, with some room below."""
+    def rule(self, room: float = 4.0) -> None:
+        """Draw a line across the page, and leave some room below."""
         self.set_draw_color(RULE)
         self.set_line_width(0.6)
         self.line(MARGIN, self.y, self.w - MARGIN, self.y)
-        self.ln(4.0)
+        self.ln(room)
 
     def need(self, room: float) -> None:
         """Start a new page if less room than given is left on this one."""
         if self.will_page_break(room):
             self.add_page()
+
+    def has_room(self, add: Callable[[_Document], None]) -> bool:
+        """Return whether what a function adds fits on the page."""
+        with self.offset_rendering() as trial:
+            add(cast("_Document", trial))  # records the same calls
+        return not trial.page_break_triggered
+
+    def add_whole(self, add: Callable[[_Document], None]) -> None:
+        """Add something on one page if it fits on one."""
+        if not self.has_room(add):
+            self.add_page()
+        add(self)
 
 
 def _add_first(pdf: _Document, report: Report, highest: float) -> None:
@@ -114,66 +145,69 @@ def _add_first(pdf: _Document, report: Report, highest: float) -> None:
     pdf.text_lines(report.subtitle, HEADING - 2.0, color=SOFT_INK)
     for block in report.first:
         pdf.ln(GAP)
-        if isinstance(block, Facts):
-            _add_facts(pdf, block)
-        else:
-            _add_block(pdf, block, highest)
+        _add_block(pdf, block, highest, whole=False)
 
 
 def _add_section(pdf: _Document, section: Section) -> None:
     pdf.ln(2 * GAP)
     pdf.need(HEADING_ROOM)
-    pdf.set_draw_color(RULE)
-    pdf.set_line_width(0.6)
     if pdf.y > TOP:
-        pdf.line(MARGIN, pdf.y - GAP, pdf.w - MARGIN, pdf.y - GAP)
+        pdf.set_y(pdf.y - GAP)
+        pdf.rule(GAP)
     pdf.text_lines(section.title, HEADING, style="B")
     waiting: list[Picture] = []  # that the rest of the page has no room for
     for block in section.blocks:
         if isinstance(block, Picture):
             waiting.append(block)
         else:
-            pdf.ln(GAP)
-            _add_block(pdf, block)
-        while waiting and _has_room(pdf, waiting[0]):
-            pdf.ln(GAP)
-            _add_block(pdf, waiting.pop(0))
+            _add_below(pdf, block)
+        while waiting and pdf.has_room(partial(_add_below, block=waiting[0])):
+            _add_below(pdf, waiting.pop(0))
     for picture in waiting:
-        pdf.ln(GAP)
-        _add_block(pdf, picture)
+        _add_below(pdf, picture)
 
 
-def _add_block(pdf: _Document, block: Block, highest: float = MAX_PICTURE_HEIGHT) -> None:
-    if isinstance(block, Paragraph):
+def _add_below(pdf: _Document, block: Block) -> None:
+    pdf.ln(GAP)
+    _add_block(pdf, block)
+
+
+def _add_block(pdf: _Document, block: Block, highest: float = MAX_PICTURE_HEIGHT, *, whole: bool = True) -> None:
+    """Add a block; pictures up to a height, and facts and the like on one page if they are to stay whole."""
+    if whole and (isinstance(block, Facts | Card) or (isinstance(block, Table) and len(block.rows) <= MOST_TOGETHER)):
+        pdf.add_whole(partial(_add_block, block=block, whole=False))
+    elif isinstance(block, Paragraph):
         pdf.text_lines(block.text, BODY)
     elif isinstance(block, Bullets):
-        for line in block.lines:
-            pdf.need(BODY * LEADING)
-            pdf.set_font(TEXT, "", BODY)
-            pdf.set_text_color(INK)
-            pdf.set_x(MARGIN + 2.0)
-            pdf.cell(BULLET_INDENT, BODY * LEADING, "•")
-            pdf.text_lines(line, BODY, indent=BULLET_INDENT)
+        _add_bullets(pdf, block.lines)
     elif isinstance(block, Code):
-        pdf.set_font(MONO, "", SMALL)
-        pdf.set_text_color(INK)
         pdf.set_fill_color(SHADE)
-        pdf.multi_cell(
-            0, SMALL * LEADING, block.text, fill=True, align="L", padding=CODE_PADDING, new_x="LMARGIN", new_y="NEXT"
-        )
+        pdf.text_lines(block.text, SMALL, family=MONO, fill=True, padding=CODE_PADDING)
         pdf.set_fill_color(PAPER)
     elif isinstance(block, Facts):
-        _add_whole(pdf, lambda page: _add_facts(page, block))
+        _add_facts(pdf, block)
     elif isinstance(block, Card):
-        _add_whole(pdf, lambda page: _add_card(page, block))
+        pdf.ln(GAP / 2)
+        pdf.rule()
+        pdf.text_lines(block.title, CARD_TITLE, style="B")
+        for inner in block.blocks:
+            pdf.ln(4.0)
+            _add_block(pdf, inner, whole=False)
     elif isinstance(block, Pictures):
         _add_pictures(pdf, block.pngs, "", CARD_PICTURE_HEIGHT)
     elif isinstance(block, Picture):
         _add_pictures(pdf, (block.png,), block.caption, FULL_PAGE_HEIGHT if block.tall else highest)
-    elif len(block.rows) <= MOST_TOGETHER:
-        _add_whole(pdf, lambda page: _add_table(page, block))
     else:
         _add_table(pdf, block)
+
+
+def _add_bullets(pdf: _Document, lines: Sequence[str]) -> None:
+    for line in lines:
+        pdf.need(BODY * LEADING)
+        top = pdf.y
+        pdf.text_lines("•", BODY, indent=2.0)
+        pdf.set_y(top)
+        pdf.text_lines(line, BODY, indent=BULLET_INDENT)
 
 
 def _add_pictures(pdf: _Document, pngs: Sequence[bytes], caption: str, highest: float) -> None:
@@ -198,23 +232,6 @@ def _add_pictures(pdf: _Document, pngs: Sequence[bytes], caption: str, highest: 
         pdf.text_lines(caption, SMALL, color=SOFT_INK)
 
 
-def _has_room(pdf: _Document, picture: Picture) -> bool:
-    """Return whether a picture fits on the page, reduced if need be."""
-    with pdf.offset_rendering() as trial:
-        cast("_Document", trial).ln(GAP)
-        _add_block(cast("_Document", trial), picture)
-    return not trial.page_break_triggered
-
-
-def _add_whole(pdf: _Document, add: Callable[[_Document], None]) -> None:
-    """Add something on one page if it fits on one."""
-    with pdf.offset_rendering() as trial:
-        add(cast("_Document", trial))  # records the same calls
-    if trial.page_break_triggered:
-        pdf.add_page()
-    add(pdf)
-
-
 def _add_facts(pdf: _Document, facts: Facts) -> None:
     """Add names and values in two columns; those of the first page in larger type between two lines."""
     size = LARGE if facts.large else BODY
@@ -232,18 +249,6 @@ def _add_facts(pdf: _Document, facts: Facts) -> None:
         pdf.set_y(max(below, pdf.y) + 1.5)
     if facts.large:
         pdf.rule()
-
-
-def _add_card(pdf: _Document, card: Card) -> None:
-    pdf.ln(GAP / 2)
-    pdf.rule()
-    pdf.text_lines(card.title, CARD_TITLE, style="B")
-    for block in card.blocks:
-        pdf.ln(4.0)
-        if isinstance(block, Facts):
-            _add_facts(pdf, block)
-        else:
-            _add_block(pdf, block)
 
 
 def _add_table(pdf: _Document, table: Table) -> None:

@@ -5,13 +5,12 @@ from __future__ import annotations
 import math
 import shlex
 from collections.abc import Iterator
-from dataclasses import Field, fields
-from typing import Any
+from dataclasses import fields
 
 from ...choosing.placement.objective import Objective
 from ...sensing.scenarios.pose_errors import PoseErrors
 from ...sensing.visibility.settings import VisibilitySettings
-from ...settings import Setting, settings_of
+from ...settings import settings_of
 from ...site.candidates import CandidateSettings
 from ...site.installed_cost import load_installed_cost
 from ...storage.json_dataclass import as_json
@@ -19,34 +18,25 @@ from ..results.placement_record import PlacementRecord, RecordedSettings
 
 
 def repeating_command(record: PlacementRecord) -> str:
-    """Return what to type in the folder of a result to have it again; empty where no one command makes it."""
+    """Return the command that repeats a placement in the folder of its result, or "" if no single command does."""
     settings = record.request
     if record.objective.solver == "none" or settings.goal.scenarios.kind == "traffic":
         return ""  # moved by hand, or optimised on runs of traffic that the record does not name
-    if not _has_options(settings):
-        return ""
-    words = ["seip", "place", "placed.blend", *_options(settings.candidates), *_of_survey(settings)]
-    words += _of_objective(settings.goal)
-    words += [] if settings.render else ["--no-render"]
-    return shlex.join([*words, "-o", "again"])
-
-
-def _has_options(settings: RecordedSettings) -> bool:
-    """Return whether commands have options for all settings that differ from their defaults."""
     scenarios, errors, candidates = settings.goal.scenarios, settings.goal.scenarios.pose_errors, settings.candidates
+    named = settings_of(CandidateSettings)
     only_in_python = (
         settings.engine != "auto",
         settings.visibility != VisibilitySettings(),
-        any(getattr(candidates, each.name) != each.default for each in _without_options(CandidateSettings)),
+        any(getattr(candidates, one.name) != one.default for one in fields(CandidateSettings) if one.name not in named),
         scenarios.count is not None,
         scenarios.held_out is not None,
         (errors.height, errors.yaw) != (errors.position, errors.tilt),
     )
-    return not any(only_in_python)
-
-
-def _without_options(kind: type) -> Iterator[Field[Any]]:
-    return (each for each in fields(kind) if each.name not in settings_of(kind))
+    if any(only_in_python):
+        return ""
+    words = ["seip", "place", "placed.blend", *_options(candidates), *_of_survey(settings)]
+    words += [*_of_objective(settings.goal), *([] if settings.render else ["--no-render"])]
+    return shlex.join([*words, "-o", "again"])
 
 
 def _of_objective(objective: Objective) -> Iterator[str]:
@@ -86,11 +76,8 @@ def _options(settings: object) -> Iterator[str]:
             continue
         yield f"--{about.option or name.replace('_', '-')}"
         if not isinstance(value, bool):
-            yield from (_typed(_in_degrees(one, about)) for one in (value if isinstance(value, tuple) else (value,)))
-
-
-def _in_degrees(value: object, about: Setting) -> object:
-    return math.degrees(value) if about.unit == "rad" and isinstance(value, float) else value
+            for one in value if isinstance(value, tuple) else (value,):
+                yield _typed(math.degrees(one) if about.unit == "rad" and isinstance(one, float) else one)
 
 
 def _typed(value: object) -> str:

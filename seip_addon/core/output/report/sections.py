@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
+from pathlib import Path
 
 import numpy as np
 
@@ -19,16 +20,16 @@ from ...choosing.placement.returns_summary import (
     returns_text,
 )
 from ...counts import counted
+from ...progress import Progress
 from ...site.candidates import PAPER_TYPES
 from ..pictures.drawing import percent
-from ..results.answer import sentence
-from ..results.costs import Costs, costs_of
+from ..results.answer import Costs, costs_of, sentence
 from ..results.file_names import POSE_ERROR_PICTURES, TRAFFIC_PICTURES
-from ..results.located import LOCATED_FILES
+from ..results.geographic_files import LOCATED_FILES
 from ..results.placement_record import RecordedSensor, relevant_warnings
-from ..results.verification_record import RecordedChange
-from ..results.verification_text import (
+from ..results.verification_record import (
     LEAST_COST,
+    RecordedChange,
     change_text,
     cost_text,
     coverage_rows,
@@ -40,16 +41,27 @@ from ..results.verification_text import (
     signed_points,
     vehicles,
 )
-from .blind_spots import BlindSpot, blind_spots, centres, seen_places, seen_streets
-from .blocks import Block, Bullets, Card, Code, Facts, Paragraph, Picture, Pictures, Report, Section, Table
-from .evidence import Evidence
+from .blind_spots import blind_spots, seen_places, seen_streets
+from .blocks import (
+    Block,
+    Bullets,
+    Card,
+    Code,
+    Facts,
+    Paragraph,
+    Picture,
+    Pictures,
+    Report,
+    Table,
+    make_sections,
+)
+from .evidence import Evidence, load_evidence
 from .figures import blind_spot_map, front_chart
+from .pdf import save_report
 from .repeat import repeating_command
 from .wording import (
-    altitude_zero,
     date,
     dollars,
-    geographic,
     in_sentence,
     limits_of,
     mounting,
@@ -89,76 +101,66 @@ def make_report(evidence: Evidence) -> Report:
     """Return the report on a placement."""
     record = evidence.record
     costs = costs_of(record)
-    sections = (
-        Section("Plan", tuple(_plan(evidence))),
-        Section("Verification of the installation", tuple(_verification(evidence))),
-        Section("Sensors", tuple(_sensors(evidence, costs))),
-        Section("Costs", tuple(_costs(costs))),
-        Section("Streets and crossings", tuple(_places(evidence))),
-        Section("Blind spots", tuple(_blind_spots(evidence))),
-        Section("Other choices", tuple(_other_choices(evidence))),
-        Section("Failures and errors", tuple(_losses(evidence))),
-        Section("How far the figures can be trusted", tuple(_trust(evidence))),
-        Section("Sources", tuple(_sources(evidence))),
-        Section("Reproduction", tuple(_making(evidence))),
-    )
-    return Report(
-        record.site.name,
-        f"Positions of roadside LiDAR sensors, {date(record.times.created)}",
-        record.times.created,
-        tuple(_first_page(evidence, costs)),
-        tuple(section for section in sections if section.blocks),
-    )
+    contents = {
+        "Plan": _plan(evidence),
+        "Verification of the installation": _verification(evidence),
+        "Sensors": _sensors(evidence, costs),
+        "Costs": _costs(costs),
+        "Streets and crossings": _places(evidence),
+        "Blind spots": _blind_spots(evidence),
+        "Other choices": _other_choices(evidence),
+        "Failures and errors": _losses(evidence),
+        "How far the figures can be trusted": _trust(evidence),
+        "Sources": _sources(evidence),
+        "Reproduction": _making(evidence),
+    }
+    subtitle = f"Positions of roadside LiDAR sensors, {date(record.times.created)}"
+    first = tuple(_first_page(evidence, costs))
+    return Report(record.site.name, subtitle, record.times.created, first, make_sections(contents))
+
+
+def write_report(folder: Path) -> Generator[Progress, None, tuple[Path, ...]]:
+    """Write ``report.html`` and ``report.pdf`` into the folder of a result; the same folder gives the same bytes.
+
+    Raises
+    ------
+    SeipError
+        The folder holds no result, or a damaged one, or cannot be written.
+    """
+    yield Progress(0, 0, "reading the result")
+    evidence = load_evidence(folder)
+    yield Progress(0, 0, "setting the report")
+    return save_report(folder, make_report(evidence))
 
 
 def _first_page(evidence: Evidence, costs: Costs) -> Iterator[Block]:
-    record = evidence.record
-    types = Counter(sensor.sensor_name for sensor in record.sensors)
-    rows = [
-        ("Where", _where(evidence)),
+    record, sensors = evidence.record, evidence.record.sensors
+    (place,) = _located(evidence, np.array(record.site.origin_m)[None], 5)
+    types = Counter(sensor.sensor_name for sensor in sensors)
+    on_poles = sum(sensor.on_pole for sensor in sensors)
+    kinds = (
+        (on_poles, "on an existing pole", "on existing poles"),
+        (len(sensors) - on_poles, "on a new post", "on new posts"),
+    )
+    mounted = ", ".join(f"{number} {one if number == 1 else several}" for number, one, several in kinds if number)
+    parts = f"{dollars(costs.sensors)} sensors, {dollars(costs.total - costs.sensors)} installation"
+    coverage, returns = record.coverage, record.returns
+    seen = f"{percent(coverage.whole)} of the road is seen, {percent(coverage.seen_twice)} by two or more sensors"
+    if returns is not None:
+        on_foot = returns_text(returns.of_each["pedestrian"])
+        seen = f"about {on_foot} points on a pedestrian in each revolution; {seen}"
+    rows = (
+        ("Where", record.site.name if evidence.geo_reference.obstacle else f"{record.site.name}, {place}"),
         ("What", ", ".join(f"{number} × {name}" for name, number in types.items()) or "no sensors"),
-        ("How many", _how_many(record.sensors)),
-        ("Price", _price(costs)),
-        ("Quality", _quality(evidence)),
-    ]
-    yield Facts(tuple(rows), large=True)
+        ("How many", f"{counted(len(sensors), 'sensor')}{': ' if mounted else ''}{mounted}"),
+        ("Price", f"{'about ' if costs.estimated else ''}{dollars(costs.total)} installed ({parts})"),
+        ("Quality", seen),
+    )
+    yield Facts(rows, large=True)
     name = next((name for name in ("view.png", "plan.png") if name in evidence.pictures), None)
     if name is not None:
         yield Picture(evidence.pictures[name], "The site with the sensors and what they see.")
     yield Paragraph(_summary(evidence))
-
-
-def _where(evidence: Evidence) -> str:
-    record = evidence.record
-    place = evidence.geo_reference.geographic(np.array(record.site.origin_m)[None])
-    if place is None:
-        return record.site.name
-    longitude, latitude, _ = place[0]
-    return f"{record.site.name}, {geographic(latitude, longitude, 5)}"
-
-
-def _how_many(sensors: Sequence[RecordedSensor]) -> str:
-    on_poles = sum(sensor.on_pole for sensor in sensors)
-    kinds = [(on_poles, "on an existing pole", "on existing poles")]
-    kinds.append((len(sensors) - on_poles, "on a new post", "on new posts"))
-    parts = [f"{number} {one if number == 1 else several}" for number, one, several in kinds if number]
-    return f"{counted(len(sensors), 'sensor')}{': ' if parts else ''}{', '.join(parts)}"
-
-
-def _price(costs: Costs) -> str:
-    installation = costs.total - costs.sensors
-    about = "about " if costs.estimated else ""
-    parts = f"{dollars(costs.sensors)} sensors, {dollars(installation)} installation"
-    return f"{about}{dollars(costs.total)} installed ({parts})"
-
-
-def _quality(evidence: Evidence) -> str:
-    coverage, returns = evidence.record.coverage, evidence.record.returns
-    seen = f"{percent(coverage.whole)} of the road is seen, {percent(coverage.seen_twice)} by two or more sensors"
-    if returns is None:
-        return seen
-    on_foot = returns_text(returns.of_each["pedestrian"])
-    return f"about {on_foot} points on a pedestrian in each revolution; {seen}"
 
 
 def _summary(evidence: Evidence) -> str:
@@ -166,17 +168,22 @@ def _summary(evidence: Evidence) -> str:
     record, coverage = evidence.record, evidence.record.coverage
     together = counted(len(record.sensors), "LiDAR sensor sees", "LiDAR sensors see")
     seen = f"{together} {percent(coverage.whole)} of the {evidence.area:,.0f} m² of road studied here"
-    parts = [f"{seen}{_between(evidence)}."]
+    band = coverage.gain_band
+    if band is not None and band.sheets:
+        span = f"{percent(band.low)} to {percent(band.high)}"
+        seen += f" ({span}, as the sensors' range is only known from data sheets)"
+    parts = [f"{seen}."]
     if coverage.central is not None:
-        parts.append(f"Of the most important part ({_central(evidence)}), {percent(coverage.central)} is seen.")
+        names = ", ".join(centre.name for centre in evidence.centres)
+        parts.append(f"Of the most important part ({names}), {percent(coverage.central)} is seen.")
     if record.returns is not None:
         parts += filter(None, [record.returns.verdict()])
-        of_each = record.returns.of_each
-        named = [f"{returns_text(number)} points on a {name}" for name, number in of_each.items()]
+        *others, last = (
+            f"{returns_text(number)} points on a {name}" for name, number in record.returns.of_each.items()
+        )
         measure = "it typically measures" if len(record.sensors) == 1 else "they typically measure"
         parts.append(
-            f"In each revolution {measure} {', '.join(named[:-1])} and {named[-1]}, with an allowance for traffic in "
-            "between."
+            f"In each revolution {measure} {', '.join(others)} and {last}, with an allowance for traffic in between."
         )
     least = min(record.crossings, key=lambda one: one.least, default=None)
     if least is not None:
@@ -187,20 +194,7 @@ def _summary(evidence: Evidence) -> str:
     if len(record.sensors) > 1:
         least_left = percent(min(after_failures(evidence.site.seen)))
         parts.append(f"If any one sensor fails, at least {least_left} of the road is still seen.")
-    parts.append(proof(evidence))
-    return " ".join(parts)
-
-
-def _between(evidence: Evidence) -> str:
-    band = evidence.record.coverage.gain_band
-    if band is None or not band.sheets:
-        return ""
-    return f" ({percent(band.low)} to {percent(band.high)}, as the sensors' range is only known from data sheets)"
-
-
-def _central(evidence: Evidence) -> str:
-    names = [centre.name for centre in centres(evidence.site.targets, evidence.site.areas)]
-    return ", ".join(names)
+    return " ".join([*parts, proof(evidence)])
 
 
 def _plan(evidence: Evidence) -> Iterator[Block]:
@@ -212,7 +206,7 @@ def _verification(evidence: Evidence) -> Iterator[Block]:
     found = evidence.verification
     if found is None:
         return
-    steps, origin = found.coverage, np.array(evidence.record.site.origin_m)
+    steps = found.coverage
     yield Paragraph(
         f"The recording “{found.recording}” of the installed sensors was compared with the plan, beam by beam. "
         f"{coverage_text(steps)}"
@@ -225,10 +219,12 @@ def _verification(evidence: Evidence) -> Iterator[Block]:
         ),
         frozenset({1, 2}),
     )
+    planned = evidence.record.coverage.whole
+    differs = f" Settings other than those of the placement, which promised {percent(planned)}, were used."
     yield Paragraph(
         "Each row includes those above it, and all are computed on the same squares of road. In the recording itself, "
         f"{percent(steps.returned)} of the squares have a measured point nearby in most turns of the sensors."
-        f"{_of_verification(evidence, steps.promised)}"
+        f"{'' if abs(steps.promised - planned) < LEAST_COST else differs}"
     )
     missing = [sensor.id for sensor in evidence.sensors if sensor.id not in {one.id for one in found.sensors}]
     if missing:
@@ -240,10 +236,10 @@ def _verification(evidence: Evidence) -> Iterator[Block]:
         yield Picture(
             evidence.pictures["returns.png"],
             "Share of the beams that return from each kind of surface, by distance: recorded (marks), promised "
-            "(dotted) and with the gain of the unit (lines). It is the power that the unit receives, as a multiple of "
-            "what its model says.",
+            "(dotted) and with the gain of the unit (lines). The gain is the power that the unit receives, as a "
+            "multiple of that in its model.",
         )
-    yield from _changes(evidence, objects(found), origin)
+    yield from _changes(evidence, objects(found))
     standing = vehicles(found)
     if standing:
         stood = counted(standing, "standing vehicle is", "standing vehicles are")
@@ -256,22 +252,15 @@ def _verification(evidence: Evidence) -> Iterator[Block]:
         )
 
 
-def _of_verification(evidence: Evidence, promised: float) -> str:
-    """Return sentences on how coverage in a verification differs from that of the placement, or ""."""
-    planned = evidence.record.coverage.whole
-    if abs(promised - planned) < LEAST_COST:
-        return ""
-    return f" Settings other than those of the placement, which promised {percent(planned)}, were used."
-
-
-def _changes(evidence: Evidence, changes: Sequence[RecordedChange], origin: Float) -> Iterator[Block]:
+def _changes(evidence: Evidence, changes: Sequence[RecordedChange]) -> Iterator[Block]:
     if not changes:
         yield Paragraph("No object has appeared or disappeared that the sensors could measure.")
         return
-    middles = np.array([change.box[:3] for change in changes]) + origin
+    middles = np.array([change.box[:3] for change in changes]) + np.array(evidence.record.site.origin_m)
+    sizes = [" × ".join(f"{side:.1f}" for side in change.box[3:6]) for change in changes]
     rows = tuple(
-        (f"{change.name}: {change_text(change)}", _size(change), place, cost_text(change.coverage_cost))
-        for change, place in zip(changes, _located(evidence, middles), strict=True)
+        (f"{change.name}: {change_text(change)}", size, place, cost_text(change.coverage_cost))
+        for change, size, place in zip(changes, sizes, _located(evidence, middles), strict=True)
     )
     yield Paragraph(
         "These objects differ from the plan. Sizes are of the parts that the sensors measure, and the last column is "
@@ -280,17 +269,17 @@ def _changes(evidence: Evidence, changes: Sequence[RecordedChange], origin: Floa
     yield Table(("What", "Size, m", "Where", "Coverage"), rows)
 
 
-def _size(change: RecordedChange) -> str:
-    return " × ".join(f"{side:.1f}" for side in change.box[3:6])
-
-
 def _sensors(evidence: Evidence, costs: Costs) -> Iterator[Block]:
     obstacle = evidence.geo_reference.obstacle
+    zero = evidence.record.site.altitude_zero or "the zero of the map's heights"
+    mercator = evidence.geo_reference.mercator
+    zone = "" if mercator is None else mercator.zone
+    projection = f"UTM zone {zone}" if zone else f"the projection “{evidence.geo_reference.projection}”"
     system = (
         f"There are no latitudes and longitudes: {obstacle}."
         if obstacle
-        else f"Eastings and northings are coordinates of {_projection(evidence)}; latitudes and longitudes are on "
-        f"WGS 84; altitudes count from {altitude_zero(evidence)}."
+        else f"Eastings and northings are coordinates of {projection}; latitudes and longitudes are on WGS 84; "
+        f"altitudes count from {zero}."
     )
     yield Paragraph(
         "Heights and coordinates are those of the optical centre. On the plans north is up, and small circles are "
@@ -317,29 +306,17 @@ def _sensor_facts(evidence: Evidence, sensor: RecordedSensor, items: Mapping[str
         yield "Roll", f"{sensor.roll_deg:.1f}°"
     if not sensor.all_round or tilted:
         yield "Yaw", f"{sensor.yaw_deg:.1f}° counter-clockwise from the map's x axis (east)"
-    yield from _coordinates(sensor)
+    if sensor.easting_m is None or sensor.northing_m is None:
+        x, y, z = sensor.map_m
+        yield "Map x, y, z", f"{x:.1f}, {y:.1f}, {z:.1f} m"
+    else:
+        yield "Easting, northing", f"{sensor.easting_m:.1f}, {sensor.northing_m:.1f} m"
+        yield "Latitude, longitude", f"{sensor.latitude_deg:.6f}°, {sensor.longitude_deg:.6f}°"
+        yield "Altitude", f"{sensor.altitude_m:.1f} m"
     parts = ", ".join(f"{name} {dollars(amount)}" for name, amount in items.items())
     yield "Cost", f"{dollars(sum(items.values()))}: {parts}"
     alone = f"; {percent(sensor.coverage_marginal)} is seen by no other" if len(evidence.sensors) > 1 else ""
     yield "Sees", f"{percent(sensor.coverage_alone)} of the road{alone}"
-
-
-def _coordinates(sensor: RecordedSensor) -> Iterator[tuple[str, str]]:
-    if sensor.easting_m is None or sensor.northing_m is None:
-        x, y, z = sensor.map_m
-        yield "Map x, y, z", f"{x:.1f}, {y:.1f}, {z:.1f} m"
-        return
-    yield "Easting, northing", f"{sensor.easting_m:.1f}, {sensor.northing_m:.1f} m"
-    if sensor.latitude_deg is not None and sensor.longitude_deg is not None:
-        yield "Latitude, longitude", f"{sensor.latitude_deg:.6f}°, {sensor.longitude_deg:.6f}°"
-    if sensor.altitude_m is not None:
-        yield "Altitude", f"{sensor.altitude_m:.1f} m"
-
-
-def _projection(evidence: Evidence) -> str:
-    mercator = evidence.geo_reference.mercator
-    zone = "" if mercator is None else mercator.zone
-    return f"UTM zone {zone}" if zone else f"the projection “{evidence.geo_reference.projection}”"
 
 
 def _costs(costs: Costs) -> Iterator[Block]:
@@ -393,12 +370,17 @@ def _blind_spots(evidence: Evidence) -> Iterator[Block]:
         "Orange is not seen, light blue seen by one sensor, dark blue by two or more. Triangles are sensors, numbers "
         "the blind spots of the table.",
     )
-    yield _spot_table(evidence, shown)
+    middles = np.array([spot.middle for spot in shown]) + np.array(evidence.record.site.origin_m)
+    rows = tuple(
+        (str(number), f"{spot.area:,.0f}", f"{spot.where} ({place})")
+        for number, (spot, place) in enumerate(zip(shown, _located(evidence, middles), strict=True), start=1)
+    )
+    yield Table(("", "Area, m²", "Where"), rows, frozenset({1}))
 
 
 def _counted_from(evidence: Evidence) -> str:
     """Return the sentence that defines distances and directions of blind spots."""
-    names = [f"“{centre.name}”" for centre in centres(evidence.site.targets, evidence.site.areas)]
+    names = [f"“{centre.name}”" for centre in evidence.centres]
     if not evidence.site.targets.central.any():
         origin = "the centre of the road, the mean of all its squares"
     elif len(names) == 1:
@@ -408,21 +390,15 @@ def _counted_from(evidence: Evidence) -> str:
     return f"Distances and directions are counted from {origin}; north is the direction of the map's y axis."
 
 
-def _spot_table(evidence: Evidence, spots: Sequence[BlindSpot]) -> Table:
-    middles = np.array([spot.middle for spot in spots]) + np.array(evidence.record.site.origin_m)
-    rows = tuple(
-        (str(number), f"{spot.area:,.0f}", f"{spot.where} ({place})")
-        for number, (spot, place) in enumerate(zip(spots, _located(evidence, middles), strict=True), start=1)
-    )
-    return Table(("", "Area, m²", "Where"), rows, frozenset({1}))
-
-
-def _located(evidence: Evidence, middles: Float) -> list[str]:
-    """Return positions as text: latitude and longitude where the map's projection is known, else map coordinates."""
-    places = evidence.geo_reference.geographic(middles)
+def _located(evidence: Evidence, points: Float, digits: int = 6) -> list[str]:
+    """Return positions as text: latitude and longitude if the map's projection is known, otherwise map coordinates."""
+    places = evidence.geo_reference.geographic(points)
     if places is None:
-        return [f"map x {x:.1f} m, y {y:.1f} m" for x, y, _ in middles.tolist()]
-    return [geographic(latitude, longitude, 6) for longitude, latitude, _ in places.tolist()]
+        return [f"map x {x:.1f} m, y {y:.1f} m" for x, y, _ in points.tolist()]
+    return [
+        f"{abs(north):.{digits}f}° {'N' if north >= 0 else 'S'}, {abs(east):.{digits}f}° {'E' if east >= 0 else 'W'}"
+        for east, north, _ in places.tolist()
+    ]
 
 
 def _other_choices(evidence: Evidence) -> Iterator[Block]:
@@ -465,20 +441,25 @@ def _weighted_share(evidence: Evidence) -> float:
 def _front(evidence: Evidence) -> Iterator[Block]:
     """Yield the chart and the table of the best placements by number of sensors."""
     record, returns, budget = evidence.record, evidence.record.returns, evidence.record.request.goal.budget
-    text: Callable[[float], str] = _percent if returns is None else returns_text
+    text: Callable[[float], str] = (lambda value: percent(value / 100)) if returns is None else returns_text
     if returns is None:
         rows = [
-            (point.count, 100 * point.coverage, 100 * point.missed, point.price, _others_see(point.missed))
+            (
+                *(point.count, 100 * point.coverage, 100 * point.missed, point.price),
+                f"at most {points(point.missed)} more" if point.missed else "none sees more",
+            )
             for point in record.front
         ]
-        weighted = " Coverage is weighted here." if np.ptp(evidence.site.problem.weights) > 0 else ""
-        measured, head, own = f"see:{weighted}", "Seen", 100 * _weighted_share(evidence)
+        weighted = ", by its weights" if np.ptp(evidence.site.problem.weights) > 0 else ""
+        measured, head, own = f"see these shares of the road{weighted}.", "Seen", 100 * _weighted_share(evidence)
         label, highest = "road seen, %", 100.0
     else:
         rows = []
         for point in returns.front:
             more = (1.0 + point.returns) * (point.gap or 0.0)  # gaps are shares of 1 + returns
-            rows.append((point.count, point.returns, more, point.price, _others_have(point.returns, point.gap)))
+            most = f"none has more than {returns_within(point.returns, point.gap)}" if point.gap else "none has more"
+            words = "may have more" if point.gap is None else most
+            rows.append((point.count, point.returns, more, point.price, words))
         measured = "typically measure these numbers of points on a road user in each revolution."
         head, own, label = "Points", returns.typical, "typical points on a road user"
         highest = max(value + more for _, value, more, *_ in rows)
@@ -495,21 +476,6 @@ def _front(evidence: Evidence) -> Iterator[Block]:
         tuple((str(count), f"{price:,.0f}", text(value), words) for count, value, _, price, words in rows),
         frozenset({0, 1, 2}),
     )
-
-
-def _others_see(missed: float) -> str:
-    return f"at most {points(missed)} more" if missed else "none sees more"
-
-
-def _percent(value: float) -> str:
-    return percent(value / 100)
-
-
-def _others_have(returns: float, gap: float | None) -> str:
-    """Return how many returns other choices of a number of sensors can have, as text."""
-    if gap is None:
-        return "may have more"
-    return f"none has more than {returns_within(returns, gap)}" if gap else "none has more"
 
 
 def after_failures(seen: Boolean) -> list[float]:

@@ -10,15 +10,9 @@ from datetime import datetime
 from ...choosing.placement.objective import CHOSEN_FOR, MOVED, MOVED_MESSAGE, Objective
 from ...counts import counted
 from ...sensing.lidar.catalogue import load_catalogue
-from ...site.scene_geometry import FROM_EXTRACT, HEIGHTS_FROM
 from ..results.answer import possible_improvement, sentence
 from ..results.placement_record import RecordedSensor
 from .evidence import Evidence
-
-LEVEL = 0.5  # metres between the road at the origin and zero in a model without heights
-ROADS = "Driving lanes"
-_RINGS = re.compile(r"beyond (.*?) neighbouring rings on a level road are more than 2δ = ([\d.]+) m apart.*")
-_RANGE = re.compile(r"detects this road \((.*?) reflectivity\) with (.*?) probability up to (.*?)(?:;.*)?$")
 
 
 def dollars(amount: float) -> str:
@@ -50,25 +44,6 @@ def date(created: str) -> str:
     return f"{when.day} {(*months, 'November', 'December')[when.month - 1]} {when.year}"
 
 
-def geographic(latitude: float, longitude: float, digits: int) -> str:
-    """Return latitude and longitude in degrees with their hemispheres."""
-    north, east = "N" if latitude >= 0 else "S", "E" if longitude >= 0 else "W"
-    return f"{abs(latitude):.{digits}f}° {north}, {abs(longitude):.{digits}f}° {east}"
-
-
-def altitude_zero(evidence: Evidence) -> str:
-    """Return the level that altitudes count from, as far as the scene knows it."""
-    site = evidence.record.site
-    file = next((note.removeprefix(HEIGHTS_FROM) for note in site.assumptions if note.startswith(HEIGHTS_FROM)), "")
-    if file:
-        return f"the zero of the heights in {file.rpartition(' to ')[0].rpartition(', ')[0]}"
-    from_extract = any(row.source == FROM_EXTRACT and row.kind == ROADS for row in site.sources)
-    if from_extract and abs(site.origin_m[2]) < LEVEL:
-        return "the ground of the model, which is level, as the extract has no heights above the sea"
-    model = re.search(r"\+geoidgrids=(\S+)", evidence.geo_reference.projection)
-    return f"the zero of the map's heights{f' (geoid {model[1]})' if model else ', whose level the map does not give'}"
-
-
 def in_sentence(name: str) -> str:
     """Return the name of a crossing as it is within a sentence: “crossing of Rope Lane”."""
     return f"c{name[1:]}" if name.startswith("Crossing") else name
@@ -86,17 +61,6 @@ def plain_warning(warning: str, names: Mapping[str, str]) -> str:
     key, _, rest = warning.partition(": ")
     if key not in names:
         return sentence(warning)
-    rings, detects = _RINGS.fullmatch(rest), _RANGE.fullmatch(rest)
-    if rings is not None:
-        return (
-            f"{names[key]}: beyond {rings[1]} the beams meet the road more than {rings[2]} m apart. Parts of the road "
-            "there are not seen although nothing blocks the view."
-        )
-    if detects is not None:
-        return (
-            f"{names[key]}: a road surface that reflects {detects[1]} of the light is detected with {detects[2]} "
-            f"probability up to {detects[3]}; vehicles are detected much farther."
-        )
     return sentence(f"{names[key]}: {rest}")
 
 

@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
 
 from ...choosing.placement.objective import ACCEPTED_MESSAGE, MOVED, purpose
 from ...choosing.placement.returns_summary import FEW_RETURNS, returns_text, share_reached
 from ...counts import counted
-from .costs import costs_of
+from ...site.installed_cost import InstalledCost, load_installed_cost
 from .placement_record import PlacementRecord
 
 LARGE_GAP = 0.05
 """Possible improvement from which a longer search is recommended."""
 WHOLE_THOUSANDS = 10_000.0
 """Price in dollars from which a header rounds to thousands."""
+SENSOR, CENT = "sensor", 0.01  # name of the first item of costs; dollars to which prices are rounded
 NEEDLESS = 0.01
 """Share of the road, lost without a sensor, below which leaving that sensor out is recommended."""
 
@@ -29,18 +33,22 @@ def status_text(record: PlacementRecord) -> str:
     """Return quality, price and certificate in a few words: ``94% · $48k · proven``."""
     price = record.price_usd
     rounded = f"${price / 1000:,.0f}k" if price >= WHOLE_THOUSANDS else f"${price:,.0f}"
-    return " · ".join((_quality(record), rounded, _certificate(record)))
+    more, status = possible_improvement(record), record.objective.status
+    unproven = "not proven" if more is None else f"within {more:.1%}"
+    certificate = {MOVED: "not optimised", "optimal": "proven"}.get(status, unproven)
+    return " · ".join((_quality(record), rounded, certificate))
 
 
 def answer(record: PlacementRecord) -> tuple[str, ...]:
-    """Return the achievement of a placement and how much better it could be, its price, and any recommendation.
-
-    Returns
-    -------
-    tuple of str
-        Two or three sentences, and those of a judgement by detection.
-    """
-    lines = [f"{_achievement(record)} {_outlook(record)}", _price(record)]
+    """Return the achievement of a placement and how much better it could be, its price, and any recommendation."""
+    if record.returns is None:
+        achieved = f"{record.coverage.whole:.1%} of the road is seen."
+    else:
+        typical = f"{_quality(record)} from a road user in each revolution: {record.returns.describe_each()}."
+        achieved = " ".join(filter(None, (record.returns.verdict(), typical)))
+    paid = f"${record.price_usd:,.0f} for {counted(len(record.sensors), 'sensor')}"
+    installed = " with installation" if record.installed else f", about ${costs_of(record).total:,.0f} installed"
+    lines = [f"{achieved} {_outlook(record)}", f"{paid}{installed}."]
     judged = () if record.judgement is None else record.judgement.sentences()
     return tuple(filter(None, (*lines, *judged, recommendation(record))))
 
@@ -64,16 +72,15 @@ def recommendation(record: PlacementRecord) -> str:
 def change_text(record: PlacementRecord, previous: PlacementRecord) -> str:
     """Return whether a placement is better or worse than the previous one, or "" if they cannot be compared.
 
-    Placements are compared by what both were chosen for, on the same number of targets: returns from road users, or
-    coverage. The difference in price is added, as a smaller number of sensors is worse and cheaper. One that was chosen
-    by detection is not compared: it may be worse by the criterion, and better.
+    Compared are placements on the same number of targets by what both were chosen for, returns from road users or
+    coverage; one that was chosen by detection may be worse by the criterion, and better.
     """
     if record.judgement is not None:
         return ""
     comparable = record.counts.targets == previous.counts.targets and record.site.name == previous.site.name
     if not comparable or (record.returns is None) != (previous.returns is None):
         return ""
-    now, before = _value(record), _value(previous)
+    now, before = (one.coverage.whole if one.returns is None else one.returns.typical for one in (record, previous))
     if now == before:
         return ""
     word = "Better" if now > before else "Worse"
@@ -95,30 +102,10 @@ def possible_improvement(record: PlacementRecord) -> float | None:
     return max(0.0, share - 1.0) if math.isfinite(share) else None
 
 
-def _value(record: PlacementRecord) -> float:
-    return record.coverage.whole if record.returns is None else record.returns.typical
-
-
 def _quality(record: PlacementRecord, *, exact: bool = False) -> str:
     if record.returns is not None:
         return f"{returns_text(record.returns.typical)} returns"
     return f"{record.coverage.whole:.2%}" if exact else f"{record.coverage.whole:.0%}"
-
-
-def _certificate(record: PlacementRecord) -> str:
-    if record.objective.status == MOVED:
-        return "not optimised"
-    if record.objective.status == "optimal":
-        return "proven"
-    more = possible_improvement(record)
-    return "not proven" if more is None else f"within {more:.1%}"
-
-
-def _achievement(record: PlacementRecord) -> str:
-    if record.returns is None:
-        return f"{record.coverage.whole:.1%} of the road is seen."
-    typical = f"{_quality(record)} from a road user in each revolution: {record.returns.describe_each()}."
-    return " ".join(filter(None, (record.returns.verdict(), typical)))
 
 
 def _outlook(record: PlacementRecord) -> str:
@@ -139,8 +126,47 @@ def _outlook(record: PlacementRecord) -> str:
     )
 
 
-def _price(record: PlacementRecord) -> str:
-    paid = f"${record.price_usd:,.0f} for {counted(len(record.sensors), 'sensor')}"
-    if record.installed:
-        return f"{paid} with installation."
-    return f"{paid}, about ${costs_of(record).total:,.0f} installed."
+@dataclass(frozen=True)
+class Costs:
+    """Cost items of each sensor in dollars, `SENSOR` first, in the order of the record.
+
+    ``estimated`` is whether the placement was made on the prices of sensors only, and installation is added here.
+    """
+
+    items: tuple[Mapping[str, float], ...]
+    estimated: bool
+
+    @property
+    def sensors(self) -> float:
+        """Price of all sensors."""
+        return sum(items[SENSOR] for items in self.items)
+
+    @property
+    def total(self) -> float:
+        """Price of all sensors with their installation."""
+        return sum(sum(items.values()) for items in self.items)
+
+    @property
+    def by_item(self) -> list[tuple[str, int, float]]:
+        """Name, number and sum of each item."""
+        names = dict.fromkeys(name for items in self.items for name in items)
+        found = [(name, [items[name] for items in self.items if name in items]) for name in names]
+        return [(name, len(each), sum(each)) for name, each in found]
+
+
+def costs_of(record: PlacementRecord) -> Costs:
+    """Return the costs of a placement; installation is that of the record, or of the shipped table if it has none."""
+    settings = record.request
+    table, bracket = settings.installed_cost or _shipped(), settings.candidates.bracket
+    costs = []
+    for sensor in record.sensors:
+        installation, recorded = table.items(on_pole=sensor.on_pole, bracket=bracket), sensor.installation_usd
+        if recorded is not None and abs(recorded - sum(installation.values())) > CENT:
+            installation = {"installation": recorded}
+        costs.append({SENSOR: sensor.price_usd - (recorded or 0.0), **installation})
+    return Costs(tuple(costs), not record.installed)
+
+
+@cache  # the panel asks at every redraw
+def _shipped() -> InstalledCost:
+    return load_installed_cost()

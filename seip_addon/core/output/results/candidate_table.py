@@ -7,10 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...choosing.placement.deployment import Deployment, Sensor, sensor_at, weighted_share
+from ...geometry.orientation import degrees, tilt_degrees
 from ...sensing.lidar.model import LidarModel
 from ...site.site import Site
 from ...storage.csv_table import save_csv
-from .headings import degrees, tilt_degrees
 
 COLUMNS = (
     "pose", "position", "on_pole", "pole_source", "sensor", "height_m", "x_m", "y_m", "z_m",
@@ -26,18 +26,15 @@ def save_candidate_table(
     visible: NDArray[np.bool_],
     deployment: Deployment,
 ) -> None:
-    """Write one row for each pose, in their order, and then one for each sensor that a hand has put elsewhere.
+    """Write one row for each pose, in order, and then one for each sensor that was moved by hand.
 
-    Parameters
-    ----------
-    visible : (c, t) bool
-    deployment : Deployment
-        The chosen sensors; their labels stand in the column ``chosen``.
+    ``visible`` (c, t) is the visibility grid; labels of the chosen sensors are in the column ``chosen``.
     """
     label = {sensor.pose: sensor.label for sensor in deployment.sensors}
     seen = visible.sum(axis=1)
     weighted = np.array([weighted_share(row, site.targets.weight) for row in visible])
-    rank = _ranks(weighted, seen)
+    rank = np.empty(len(seen), dtype=np.int64)  # 1 for the pose that alone sees the most weight; then by targets seen
+    rank[np.lexsort((np.arange(len(seen)), -seen, -weighted))] = np.arange(1, len(seen) + 1)
     rows: list[tuple[object, ...]] = []
     for pose in range(len(site.candidates)):
         sensor = sensor_at(site, models, label.get(pose, ""), pose)
@@ -66,11 +63,3 @@ def _place(sensor: Sensor, site: Site, source: str) -> tuple[object, ...]:
         f"{tilt_degrees(sensor.tilt):.3f}",
         f"{sensor.price:.2f}",
     )
-
-
-def _ranks(weighted: NDArray[np.float64], seen: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return 1 for the pose that alone sees the most weight; equals go by targets seen, then by index."""
-    order = np.lexsort((np.arange(len(seen)), -seen, -weighted))
-    rank = np.empty(len(order), dtype=np.int64)
-    rank[order] = np.arange(1, len(order) + 1)
-    return rank

@@ -19,11 +19,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...choosing.placement.deployment import Deployment, Sensor
+from ...geometry.orientation import clockwise_degrees, tilt_degrees
 from ...sensing.lidar.carla_dropoff import CarlaDropoff
 from ...sensing.lidar.model import LidarModel
 from ...sensing.lidar.range_equation import DROPOFF_REFLECTIVITY
 from ...storage.files import save_json
-from .headings import clockwise_degrees, tilt_degrees
 
 BLUEPRINT = "sensor.lidar.ray_cast"
 EVEN_WITHIN = math.radians(0.02)  # a hundredth is what data sheets print
@@ -32,16 +32,8 @@ EVEN_WITHIN = math.radians(0.02)  # a hundredth is what data sheets print
 def carla_spawns(deployment: Deployment, origin: NDArray[np.float64]) -> list[dict[str, Any]]:
     """Return one description of an actor for each sensor, in the axes of the CARLA town made from the map.
 
-    Parameters
-    ----------
-    origin : (3,) float64, metres
-        Map coordinates of the local origin.
-
-    Returns
-    -------
-    list of dict
-        ``blueprint``, ``transform`` in metres and degrees, and ``attributes`` as the text that
-        ``ActorBlueprint.set_attribute`` takes; see docs/formats.md.
+    ``origin`` (3,) has the map coordinates of the local origin. Each has a ``blueprint``, a ``transform`` in metres and
+    degrees, and ``attributes`` as the text that ``ActorBlueprint.set_attribute`` takes; see docs/formats.md.
     """
     return [_spawn(sensor, origin) for sensor in deployment.sensors]
 
@@ -98,8 +90,27 @@ def _rows(model: LidarModel) -> int:
 
 
 def _note(model: LidarModel) -> str:
-    """Say what CARLA cannot express, or nothing where it can express all."""
-    parts = [_of_rosette(model)] if model.rosette is not None else _of_channels(model)
+    """Return what CARLA cannot express, or ""."""
+    parts = []
+    if model.rosette is not None:
+        parts.append(
+            f"draws a rosette of {math.degrees(model.field_of_view):.3g} degrees that does not repeat, where CARLA "
+            f"repeats an even raster of {_rows(model)} rows over the enclosing square, with the same number of points"
+        )
+    else:
+        descending = np.sort(model.elevations)[::-1]
+        off = np.abs(descending - np.linspace(descending[0], descending[-1], len(descending))).max()
+        if off > EVEN_WITHIN:
+            parts.append(
+                f"spaces its {len(descending)} channels unevenly, where CARLA spreads them evenly over the same field "
+                f"of view, so that its beams are up to {math.degrees(off):.1f} degrees off in elevation"
+            )
+        ahead = np.abs(model.azimuth_offsets).max()
+        if ahead > 0.0:
+            parts.append(
+                f"fires channels up to {math.degrees(ahead):.2f} degrees of azimuth off the direction of its head, "
+                "where CARLA fires all along it"
+            )
     if not isinstance(model.law, CarlaDropoff):
         parts.append(
             f"detects a surface by its reflectivity and angle, where CARLA loses returns by range alone: the drop-"
@@ -108,30 +119,3 @@ def _note(model: LidarModel) -> str:
     if model.min_range > 0.0:
         parts.append(f"returns nothing nearer than {model.min_range:g} m, where CARLA does")
     return f"{model.name} {'; it '.join(parts)}" if parts else ""
-
-
-def _of_rosette(model: LidarModel) -> str:
-    across = math.degrees(model.field_of_view)
-    return (
-        f"draws a rosette of {across:.3g} degrees that does not repeat, where CARLA repeats an even raster of "
-        f"{_rows(model)} rows over the enclosing square, with the same number of points"
-    )
-
-
-def _of_channels(model: LidarModel) -> list[str]:
-    parts = []
-    descending = np.sort(model.elevations)[::-1]
-    even = np.linspace(descending[0], descending[-1], len(descending))
-    off = np.abs(descending - even).max()
-    if off > EVEN_WITHIN:
-        parts.append(
-            f"spaces its {len(descending)} channels unevenly, where CARLA spreads them evenly over the same field of "
-            f"view, so that its beams are up to {math.degrees(off):.1f} degrees off in elevation"
-        )
-    ahead = np.abs(model.azimuth_offsets).max()
-    if ahead > 0.0:
-        parts.append(
-            f"fires channels up to {math.degrees(ahead):.2f} degrees of azimuth off the direction of its head, where "
-            "CARLA fires all along it"
-        )
-    return parts

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from ...storage.json_dataclass import read_record
 
 SCHEMA = "seip-detection/1"
-RECORDING_SCHEMA = "seip-recording/1"
+RECORDING_SCHEMA = "seip-recording/2"
 """Of a ``detection.json`` on the recording of real sensors."""
 MAIN_RULE = "bev_0.7"
 """Counts all road users; in every record."""
@@ -16,16 +16,10 @@ FORMATS = ("kitti", "openpcdet")
 
 @dataclass(frozen=True)
 class Precision:
-    """Average precision by one rule.
+    """Average precision by one rule, 0 to 1, with the number of road users that count over all frames.
 
-    Parameters
-    ----------
-    average_precision : float, 0 to 1
-        NaN without road users; records leave such rules out.
-    interval : (float, float) or None
-        95 % interval over runs of traffic; None if there are too few.
-    road_users : int
-        Number of road users that count, over all frames.
+    It is NaN without road users; records leave such rules out. ``interval`` is that of 95 % over runs of traffic, None
+    if these are too few.
     """
 
     average_precision: float
@@ -46,11 +40,5 @@ class DetectionRecord:
 
 
 def parsed_detection(text: str) -> DetectionRecord:
-    """Read the text of a ``detection.json``.
-
-    Raises
-    ------
-    SeipError
-        It is none, or one of another version.
-    """
-    return read_record(DetectionRecord, text, SCHEMA, "the record of detection", "detect again")
+    """Read the text of a ``detection.json``; raise `SeipError` if it is none, or one of another version."""
+    return read_record(DetectionRecord, text, (SCHEMA,), "the record of detection", "detect again")

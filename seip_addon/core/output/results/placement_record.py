@@ -5,10 +5,12 @@
 
 import json
 import math
+import os
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, fields, is_dataclass, replace
 from datetime import datetime
-from functools import cached_property
+from functools import cached_property, lru_cache
+from pathlib import Path
 from typing import Any, Literal, TypeVar, cast
 
 import numpy as np
@@ -20,8 +22,9 @@ from ...choosing.placement.objective import FrontPoint, Objective, Solution
 from ...choosing.placement.problem import Placement
 from ...choosing.placement.returns_summary import CrossingReturns, ReturnsSummary, share_reached
 from ...choosing.placement.search_limits import DEFAULT_EFFORT
+from ...errors import SeipError
 from ...geometry.geo_reference import GeoReference
-from ...geometry.orientation import orientation
+from ...geometry.orientation import degrees, orientation, tilt_degrees
 from ...sensing.lidar.model import LidarModel
 from ...sensing.scans.sensor import MountedSensor
 from ...sensing.visibility.settings import Engine, VisibilitySettings
@@ -30,14 +33,15 @@ from ...site.candidates import CandidateSettings
 from ...site.installed_cost import InstalledCost
 from ...site.site import Site
 from ...site.sources import SourceCount
-from ...storage.json_dataclass import from_json
-from .headings import degrees, tilt_degrees
+from ...storage.files import save_json
+from ...storage.json_dataclass import from_json, read_record
 
 Point = tuple[float, float, float]
 
 Value = TypeVar("Value")
 
-SCHEMA = "seip-placement/3"
+SCHEMA, OLDER_SCHEMA = "seip-placement/4", "seip-placement/3"
+"""Version that is written, and the one before, which is read as well."""
 SHARE_DIGITS = 9
 DIGITS: Mapping[str, int | None] = {
     **dict.fromkeys(("price_usd", "installation_usd", "price"), 2),  # dollars
@@ -50,20 +54,12 @@ DIGITS: Mapping[str, int | None] = {
     **dict.fromkeys(("objective", "value", "bound", "settings", "judgement"), None),
 }
 """Decimal places of what is not a share; None where numbers stay as they are."""
+LEFT_OUT = {"roll_deg", "installation_usd", "returns", "judgement"}  # if they are None
 
 
 @dataclass(frozen=True)
 class Provenance:
-    """When and with what a placement was made: what may differ where the placement does not.
-
-    Parameters
-    ----------
-    created : datetime
-        With its time zone.
-    durations : mapping of str to float, seconds
-    versions : mapping of str to str
-        Versions of the program and its libraries; see `versions`.
-    """
+    """Time of a placement with its time zone, seconds of each step, and versions; see `versions`."""
 
     created: datetime
     durations: Mapping[str, float]
@@ -92,23 +88,20 @@ class RecordedGeoReference:
 
 @dataclass(frozen=True)
 class RecordedSite:
-    """A scene, the map coordinates of its local origin, and what its map says of where that is.
+    """A scene, the map coordinates of its local origin, and what its map says of where that is; see `Site`.
 
-    Records of earlier versions hold no ``geo_reference``, ``sources``, ``attribution`` and ``assumptions``.
+    Records of earlier versions lack all but the name and the origin.
 
     Parameters
     ----------
-    sources : tuple of SourceCount
-        Where the scene's surfaces come from.
-    attribution : tuple of str
-        Credits that these sources demand.
-    assumptions : tuple of str
-        Assumptions and omissions of the model of the map.
+    altitude_zero : str
+        Level that altitudes count from, in words; see `Site.altitude_zero`.
     """
 
     name: str
     origin_m: Point
     geo_reference: RecordedGeoReference | None = None
+    altitude_zero: str = ""
     sources: tuple[SourceCount, ...] = ()
     attribution: tuple[str, ...] = ()
     assumptions: tuple[str, ...] = ()
@@ -118,26 +111,26 @@ class RecordedSite:
 class RecordedSensor:
     """One chosen sensor, by its label: see `placement.deployment.Sensor`.
 
+    Records of earlier versions lack ``evidence``, ``location`` and ``all_round``.
+
     Parameters
     ----------
     pose : int or None
-        Row of the visibility grid; None where a hand has put the sensor elsewhere.
+        Row of the visibility grid; None for a sensor that was moved by hand, which has a roll.
     sensor : str
         Its type's key in the catalogue.
-    roll_deg : float, optional
-        Roll, only of a sensor that was moved by hand.
     latitude_deg, longitude_deg, altitude_m : float, optional
-        On WGS 84, and the height above the map's zero; None where the map's projection is not known.
+        On WGS 84, and the height above the map's zero; None if the map's projection is not known.
     easting_m, northing_m : float, optional
         Coordinates of the record's projection: map coordinates and the offset of its header. None likewise.
     evidence : str
-        What its type's law of detection rests on; records of earlier versions lack it.
+        Basis of its type's law of detection.
     installation_usd : float, optional
-        Of the price, what it takes to install the sensor; None where prices are those of sensors alone.
+        Share of the price for installation; None if prices are those of sensors only.
     location : str
-        Street, side and distances in words; see `locations`. Records of earlier versions lack it.
+        Street, side and distances in words; see `locations`.
     all_round : bool
-        Whether its type measures in all directions, so that its yaw does not matter; false in earlier versions.
+        Whether its type measures in all directions, so that its yaw does not matter.
     """
 
     id: str
@@ -168,9 +161,8 @@ class RecordedSensor:
 
     @property
     def orientation(self) -> Float:
-        """How it is turned: the rotation from its axes to the site's, (3, 3) float64."""
-        yaw, tilt, roll = map(math.radians, (self.yaw_deg, self.tilt_deg, self.roll_deg or 0.0))
-        return orientation(yaw, tilt, roll)
+        """Rotation from its axes to the site's, (3, 3) float64."""
+        return orientation(*map(math.radians, (self.yaw_deg, self.tilt_deg, self.roll_deg or 0.0)))
 
     def mounted(self, model: LidarModel) -> MountedSensor:
         """Return the sensor as scans have it, with the LiDAR model of its type."""
@@ -244,13 +236,8 @@ class RecordedTimes:
 class RecordedSettings:
     """Settings of a placement; records of earlier versions may lack all but the objective and the sensor types.
 
-    Parameters
-    ----------
-    goal : Objective
-    catalogue : tuple of str
-        Names of the user's own catalogues, without their folders.
-    render : bool
-        Whether the result includes a rendered view.
+    ``catalogue`` has the names of the user's own catalogues without their folders, and ``render`` is whether the result
+    includes a rendered view.
     """
 
     goal: Objective
@@ -270,23 +257,22 @@ class RecordedSettings:
 class PlacementRecord:
     """Content of ``placement.json`` without its schema, key by key; see docs/formats.md.
 
+    Records of earlier versions lack ``front`` and ``crossings``.
+
     Parameters
     ----------
-    sensors : tuple of RecordedSensor
-        In the order of their labels.
-    price_usd : float, dollars
     settings : mapping
         All settings by name; `request` is the part that this program reads again.
     inputs : mapping of str to str
-        Digests of what went in.
+        Digests of the inputs.
     returns : ReturnsSummary, optional
-        Returns from road users, where the placement was chosen for them.
+        Returns from road users, if the placement was chosen for them.
     front : tuple of FrontPoint
-        Best placements found with fewer and more sensors; records of earlier versions lack it.
+        Best placements found with fewer and more sensors.
     crossings : tuple of CrossingReturns
-        Expected returns from a pedestrian on each crossing; records of earlier versions lack them.
+        Expected returns from a pedestrian on each crossing.
     judgement : Judgement, optional
-        What a detector finds with it and with other finalists, where the placement was chosen among such.
+        Detections with it and with other finalists, if it was chosen among them.
     """
 
     site: RecordedSite
@@ -352,7 +338,11 @@ class PlacementRecord:
 
     def as_json(self) -> dict[str, Any]:
         """Return the value of ``placement.json``, its keys in order."""
-        return {"schema": SCHEMA, **asdict(self, dict_factory=_without_absent)}
+
+        def present(items: list[tuple[str, Any]]) -> dict[str, Any]:
+            return {name: value for name, value in items if value is not None or name not in LEFT_OUT}
+
+        return {"schema": SCHEMA, **asdict(self, dict_factory=present)}
 
     def text(self) -> str:
         """Return the record in one line of JSON, for `parsed_record`."""
@@ -375,46 +365,63 @@ def placement_record(
     settings : mapping
         All that the user could have set, defaults included, by name; values that JSON can hold.
     inputs : mapping of str to str
-        Digests or names of what went in.
+        Digests or names of the inputs.
     warnings : tuple of str
         What the user should know before trusting the figures.
     """
-    deployment, placement, greedy = solution.deployment, solution.placement, solution.greedy
+    deployment, placement, objective = solution.deployment, solution.placement, solution.objective
+    of_returns, candidates = deployment.returns is not None, site.candidates
+    known = site.geo_reference.in_hemisphere(site.origin)
+    *offset, heading = known.header_offset
+    reference = RecordedGeoReference(known.projection, _point(offset), tilt_degrees(heading))
+    greedy = (
+        None
+        if solution.greedy is None
+        else RecordedGreedy(
+            value=_significant(solution.greedy.objective),
+            # The better of the two bounds: once the optimum is proven, it no longer depends on a platform's rounding.
+            bound=_if_finite(min(solution.greedy.bound, placement.bound)),
+            gap_to_placement=1.0 - share_reached(solution.greedy.objective, placement.objective, of_returns=of_returns),
+            poses=tuple(solution.greedy.chosen.tolist()),
+            notes=solution.greedy.notes,
+        )
+    )
     record = PlacementRecord(
         site=RecordedSite(
-            *(site.name, _point(site.origin), _geo_reference(site.geo_reference.in_hemisphere(site.origin))),
+            *(site.name, _point(site.origin), reference if known.projection else None, site.altitude_zero),
             *(site.sources, site.attribution, site.assumptions),
         ),
         sensors=tuple(recorded_sensor(sensor, site) for sensor in deployment.sensors),
         price_usd=float(deployment.price),
         coverage=RecordedCoverage(
-            whole=deployment.coverage,
-            central=deployment.central,
-            weighted=deployment.weighted,
-            seen_twice=deployment.seen_twice,
-            gain_band=deployment.gain_band,
+            *(deployment.coverage, deployment.central, deployment.weighted, deployment.seen_twice),
+            deployment.gain_band,
         ),
         objective=RecordedObjective(
-            kind="vanilla" if solution.objective.central_weight is None else "weighted",
-            sought=_sought(solution),
+            kind="vanilla" if objective.central_weight is None else "weighted",
+            sought="least price" if objective.cheapest else "most returns" if of_returns else "most coverage",
             value=_significant(placement.objective),
-            bound=_found(placement.bound),
-            gap=_found(placement.gap),
+            bound=_if_finite(placement.bound),
+            gap=_if_finite(placement.gap),
             status=placement.status,
             solver=placement.solver,
         ),
-        greedy=None if greedy is None else _greedy(greedy, placement, of_returns=deployment.returns is not None),
-        counts=_counts(site),
+        greedy=greedy,
+        counts=RecordedCounts(
+            targets=len(site.targets),
+            targets_central=int(np.count_nonzero(site.targets.central)),
+            positions=len(candidates.position),
+            positions_on_poles=int(np.count_nonzero(candidates.on_pole)),
+            poses=len(candidates),
+            dropped={reason: int(count) for reason, count in sorted(candidates.dropped.items())},
+        ),
         settings=dict(settings),
         seeds={},  # visibility and placement draw no random numbers
         inputs=dict(inputs),
         notes=placement.notes,
         warnings=warnings,
         versions=dict(provenance.versions),
-        times=RecordedTimes(
-            provenance.created.isoformat(timespec="seconds"),
-            provenance.durations,
-        ),
+        times=RecordedTimes(provenance.created.isoformat(timespec="seconds"), provenance.durations),
         returns=deployment.returns,
         front=tuple(solution.front),
         crossings=tuple(solution.crossings),
@@ -423,24 +430,10 @@ def placement_record(
     return _rounded_parts(record)
 
 
-def _without_absent(items: list[tuple[str, Any]]) -> dict[str, Any]:
-    return {name: value for name, value in items if name not in _LEFT_OUT or value is not None}
-
-
-_LEFT_OUT = {"roll_deg", "installation_usd", "returns", "judgement"}  # where there are none
-
-
-def _geo_reference(known: GeoReference) -> RecordedGeoReference | None:
-    if not known.projection:
-        return None
-    return RecordedGeoReference(known.projection, _point(known.header_offset[:3]), tilt_degrees(known.header_offset[3]))
-
-
 def recorded_sensor(sensor: Sensor, site: Site) -> RecordedSensor:
     """Return the record of a sensor of a deployment on a site."""
-    place = site.geographic(sensor.xyz[None])
-    longitude, latitude, altitude = (None, None, None) if place is None else place[0]
-    map_xyz = sensor.xyz + site.origin
+    map_xyz, place = sensor.xyz + site.origin, site.geographic(sensor.xyz[None])
+    longitude, latitude, altitude = (None,) * 3 if place is None else place[0]
     reference = site.geo_reference.in_hemisphere(site.origin)
     easting, northing = (None, None) if place is None else reference.projected(map_xyz[None])[0, :2]
     record = RecordedSensor(
@@ -472,12 +465,6 @@ def recorded_sensor(sensor: Sensor, site: Site) -> RecordedSensor:
     return _rounded_parts(record)
 
 
-def _sought(solution: Solution) -> Literal["most coverage", "most returns", "least price"]:
-    if solution.objective.cheapest:
-        return "least price"
-    return "most coverage" if solution.deployment.returns is None else "most returns"
-
-
 def _rounded_parts(value: Value, digits: int | None = SHARE_DIGITS) -> Value:
     """Round all numbers in a dataclass, tuple or mapping: shares, or what `DIGITS` has by its name."""
     rounded: Any = value
@@ -491,32 +478,8 @@ def _rounded_parts(value: Value, digits: int | None = SHARE_DIGITS) -> Value:
         rounded = {name: _rounded_parts(part, digits) for name, part in value.items()}
     elif is_dataclass(value) and not isinstance(value, type):
         own = ((each.name, getattr(value, each.name)) for each in fields(value))
-        parts = {name: _rounded_parts(part, DIGITS.get(name, SHARE_DIGITS)) for name, part in own}
-        rounded = replace(value, **parts)
+        rounded = replace(value, **{name: _rounded_parts(part, DIGITS.get(name, SHARE_DIGITS)) for name, part in own})
     return cast("Value", rounded)
-
-
-def _greedy(greedy: Placement, placement: Placement, *, of_returns: bool) -> RecordedGreedy:
-    return RecordedGreedy(
-        value=_significant(greedy.objective),
-        # The better of the two bounds: once the optimum is proven, it no longer depends on a platform's rounding.
-        bound=_found(min(greedy.bound, placement.bound)),
-        gap_to_placement=1.0 - share_reached(greedy.objective, placement.objective, of_returns=of_returns),
-        poses=tuple(int(pose) for pose in greedy.chosen),
-        notes=greedy.notes,
-    )
-
-
-def _counts(site: Site) -> RecordedCounts:
-    candidates = site.candidates
-    return RecordedCounts(
-        targets=len(site.targets),
-        targets_central=int(np.count_nonzero(site.targets.central)),
-        positions=len(candidates.position),
-        positions_on_poles=int(np.count_nonzero(candidates.on_pole)),
-        poses=len(candidates),
-        dropped={reason: int(count) for reason, count in sorted(candidates.dropped.items())},
-    )
 
 
 def _point(xyz: Iterable[float]) -> Point:
@@ -528,6 +491,41 @@ def _significant(value: float) -> float:
     return float(f"{value:.12g}")
 
 
-def _found(value: float) -> float | None:
+def _if_finite(value: float) -> float | None:
     """Return None for a bound, or a gap, that the solver has not found."""
     return _significant(value) if math.isfinite(value) else None
+
+
+def save_placement(path: str | os.PathLike[str], record: PlacementRecord) -> None:
+    """Write ``placement.json``."""
+    save_json(path, record.as_json())
+
+
+def load_placement(path: str | os.PathLike[str]) -> PlacementRecord:
+    """Read ``placement.json``.
+
+    Raises
+    ------
+    SeipError
+        There is no such file, or it is not a placement of a version that this program can read.
+    """
+    try:
+        content = Path(path).read_bytes()
+    except OSError as error:
+        raise SeipError(f"cannot read {path}: {error.strerror}; name the placement.json of a finished run") from error
+    return _read(content, str(path))
+
+
+@lru_cache(maxsize=8)
+def parsed_record(text: str) -> PlacementRecord:
+    """Read the record that a scene keeps as `PlacementRecord.text`; panels do so at every redraw."""
+    return _read(text, "the placement that this scene keeps")
+
+
+def comparable(record: PlacementRecord) -> dict[str, Any]:
+    """Return the content of a file without times and versions, which differ between machines and runs."""
+    return {key: value for key, value in record.as_json().items() if key not in {"times", "versions"}}
+
+
+def _read(text: str | bytes, name: str) -> PlacementRecord:
+    return read_record(PlacementRecord, text, (SCHEMA, OLDER_SCHEMA), name, "place the sensors again")

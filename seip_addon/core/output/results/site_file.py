@@ -3,52 +3,39 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import shapely
 
-from ...arrays import Boolean, Float
+from ...arrays import Boolean
 from ...choosing.placement.objective import Solution
 from ...choosing.placement.problem import PlacementConstraints
-from ...site.scene_geometry import NamedArea, SceneGeometry
+from ...site.scene_geometry import SceneGeometry
 from ...site.site import Site, Targets
 from ...storage.array_file import ArrayFile
 
-FILE = ArrayFile(
-    "seip.site",
-    1,
-    "table of targets and poses",
-    "place the sensors again",
-    {
-        "targets": "f8",
-        "weight": "f8",
-        "central": "u1",
-        "within": "u1",
-        "seen": "u1",
-        "counted": "f8",
-        "price": "f8",
-        "position": "i8",
-        "xyz": "f8",
-        "sensor": "U",
-        "forbidden": "u1",
-        "mandatory": "u1",
-    },
-)
+ARRAYS = {
+    "targets": "f8",
+    "weight": "f8",
+    "central": "u1",
+    "within": "u1",
+    "seen": "u1",
+    "counted": "f8",
+    "price": "f8",
+    "position": "i8",
+    "xyz": "f8",
+    "sensor": "U",
+    "forbidden": "u1",
+    "mandatory": "u1",
+}
+FILE = ArrayFile("seip.site", 1, "table of targets and poses", "place the sensors again", ARRAYS)
 WEIGHTED, PLACE = "weighted region", "place"
 
 
 @dataclass(frozen=True, eq=False)
 class Area:
-    """A named part of the region, and which targets lie in it.
-
-    Parameters
-    ----------
-    kind : str
-        `WEIGHTED`, or `PLACE` for a street or crossing of the map.
-    within : (t,) bool
-    """
+    """A named part of the region, `WEIGHTED` or a `PLACE` of the map (street, crossing), and its targets (t,)."""
 
     name: str
     kind: str
@@ -59,14 +46,8 @@ class Area:
 class SiteFile:
     """Targets, named areas, visibility from each chosen sensor, and the problem that was solved.
 
-    Parameters
-    ----------
-    key : str
-        Key of the visibility grid that this belongs to.
-    seen : (k, t) bool
-        Targets that each sensor sees, in the order of the record.
-    problem : PlacementConstraints
-        The problem without its visibility, which is in ``visibility.npz``.
+    ``seen`` (k, t) is in the order of the record; ``key`` is that of the visibility grid, ``visibility.npz``, which has
+    the visibility of the problem.
     """
 
     key: str
@@ -84,23 +65,15 @@ def save_site_file(
     solution: Solution,
     problem: PlacementConstraints,
 ) -> None:
-    """Write ``site.npz``.
-
-    Parameters
-    ----------
-    key : str
-        Key of the visibility grid.
-    problem : PlacementConstraints
-        Constraints and weights of the solution's objective.
-    """
+    """Write ``site.npz``, with the key of the visibility grid and the constraints of the solution's objective."""
     targets = site.targets
     areas = [(WEIGHTED, area) for area in geometry.weighted_regions] + [(PLACE, area) for area in geometry.places]
-    names = [str(name) for name in problem.group_names]
+    within = [shapely.intersects_xy(area.polygon, *targets.xyz[:, :2].T) for _, area in areas]
     header = {
         "key": key,
         "spacing_m": targets.spacing,
         "areas": [[area.name, kind] for kind, area in areas],
-        "groups": names,
+        "groups": [str(name) for name in problem.group_names],
         "count": problem.count,
         "budget_usd": problem.budget,
         "min_distance_m": problem.min_distance,
@@ -109,7 +82,7 @@ def save_site_file(
         "targets": targets.xyz,
         "weight": targets.weight,
         "central": targets.central,
-        "within": _within([area for _, area in areas], targets.xyz),
+        "within": np.array(within, dtype=bool).reshape(len(areas), len(targets)),
         "seen": solution.deployment.rows.reshape(-1, len(targets)),
         "counted": problem.weights,
         "price": problem.prices,
@@ -150,9 +123,3 @@ def load_site_file(path: str | os.PathLike[str]) -> SiteFile:
         )
         areas = tuple(Area(*one, row.astype(bool)) for one, row in zip(named, arrays["within"], strict=True))
         return SiteFile(str(header["key"]), targets, areas, arrays["seen"].astype(bool), problem)
-
-
-def _within(areas: Sequence[NamedArea], xyz: Float) -> Boolean:
-    """Return which targets (t, 3) lie in which areas, (a, t) bool."""
-    rows = [shapely.intersects_xy(area.polygon, xyz[:, 0], xyz[:, 1]) for area in areas]
-    return np.array(rows, dtype=bool).reshape(len(areas), len(xyz))

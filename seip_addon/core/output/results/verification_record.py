@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Literal
 
+from ...counts import counted
 from ...sensing.recordings.figures import CoverageSteps
 from ...sensing.recordings.verification import InstalledSensor
+from ...site.locations import direction
 from ...storage.files import read_small
 from ...storage.json_dataclass import read_record
 
@@ -22,10 +27,7 @@ Box = tuple[float, float, float, float, float, float, float]
 class RecordedChange:
     """An object that is new, gone, or a standing vehicle; see `Change`.
 
-    Parameters
-    ----------
-    coverage_cost : float or None
-        Share of the road that it costs, negative if it gains; None where it was not computed.
+    ``coverage_cost`` is the share of the road that it costs, negative if it gains; None if it was not computed.
     """
 
     kind: Literal["new", "gone", "vehicle"]
@@ -37,13 +39,7 @@ class RecordedChange:
 
 @dataclass(frozen=True)
 class VerificationRecord:
-    """Content of ``verification.json``.
-
-    Parameters
-    ----------
-    site, recording : str
-        Names of the scene and of the recording.
-    """
+    """Content of ``verification.json``, with the names of the scene and of the recording."""
 
     site: str
     recording: str
@@ -61,4 +57,137 @@ def load_verification(path: Path) -> VerificationRecord:
         It is damaged, or of a version that this program cannot read.
     """
     cure = "verify the installation again"
-    return read_record(VerificationRecord, read_small(path, _MOST_BYTES, cure), SCHEMA, str(path), cure)
+    return read_record(VerificationRecord, read_small(path, _MOST_BYTES, cure), (SCHEMA,), str(path), cure)
+
+
+LEAST_COST = 0.0005
+"""Share of coverage that is shown as 0.1 points."""
+
+_LEAST_SHIFT, _LEAST_ANGLE = 0.005, 0.05  # metres and degrees that are shown as 0.01 m and 0.1 degrees
+_NAMED = 3  # changes that are named in a sentence
+
+
+def pose_text(pose: InstalledSensor) -> str:
+    """Return two sentences: how far a sensor is from its plan, in position and in direction, with intervals."""
+    east, north, up = pose.shift_m
+    parts = [
+        f"{abs(value):.2f} m {positive if value > 0 else negative}"
+        for value, positive, negative in ((east, "east", "west"), (north, "north", "south"), (up, "higher", "lower"))
+        if abs(value) >= _LEAST_SHIFT
+    ]
+    at = f"{pose.id} is {math.hypot(*pose.shift_m):.2f} m from its planned position"
+    where = f"{at}: {_listed(parts)}" if parts else at
+    known = f"each within {_within(max(pose.shift_half_width_m), 1000, 'mm')} with 95% confidence"
+    lean_x, lean_y, turn = pose.rotation_deg
+    lean, parts = math.hypot(lean_x, lean_y), []
+    if abs(turn) >= _LEAST_ANGLE:
+        parts.append(f"turned {abs(turn):.1f}° {'counter-clockwise' if turn > 0 else 'clockwise'} as seen from above")
+    if lean >= _LEAST_ANGLE:
+        # A rotation vector (x, y) about horizontal axes moves the top of the sensor along (y, -x).
+        parts.append(f"tilted {lean:.1f}° to the {direction((lean_y, -lean_x))}")
+    within = _within(max(pose.rotation_half_width_deg), 100, "hundredths of a degree", "one hundredth of a degree")
+    points = f"It is {_listed(parts)}" if parts else "It points as planned"
+    return f"{where}, {known}. {points}, within {within}."
+
+
+def gain_text(pose: InstalledSensor) -> str:
+    """Return what the gain of a unit means for its range."""
+    if pose.gain is None:
+        return f"The recording does not determine the gain of {pose.id}; it counts as its data sheet says."
+    gain = pose.gain
+    # Received power falls with the square of the distance, so that the range grows with the root of the gain.
+    reach, low, high = (math.sqrt(value) for value in (gain.value, gain.low, gain.high))
+    says = f"{pose.id} has a gain of {gain.value:.2f} ({gain.low:.2f} to {gain.high:.2f})"
+    if gain.low <= 1.0 <= gain.high:
+        return f"{says}, which does not differ significantly from its model: its range is as promised."
+    return f"{says}: it detects the same surface up to about {reach:.0%} of the distance ({low:.0%} to {high:.0%})."
+
+
+def returns_sentence(pose: InstalledSensor) -> str:
+    """Return the range at which returns from the road differ most from the promise, or "" without any."""
+    road = [one for one in pose.returns if one.surface == "road"]
+    if not road:
+        return ""
+    most = max(road, key=lambda one: abs(one.measured - one.predicted))
+    return (
+        f"Of its beams that meet the road at {most.low:g} to {most.high:g} m, {most.measured:.0%} return; "
+        f"{most.predicted:.0%} were promised."
+    )
+
+
+def change_text(change: RecordedChange) -> str:
+    """Return what a change is."""
+    return {"new": "not in the plan", "gone": "no longer there", "vehicle": "standing vehicle"}[change.kind]
+
+
+def cost_text(cost: float | None) -> str:
+    """Return what a change costs of the coverage."""
+    if cost is None:
+        return "not computed"
+    if abs(cost) < LEAST_COST:
+        return "no effect"
+    return f"{'costs' if cost > 0 else 'adds'} {abs(100 * cost):.1f} points"
+
+
+def objects(record: VerificationRecord) -> list[RecordedChange]:
+    """Return the changes that are not vehicles."""
+    return [change for change in record.changes if change.kind != "vehicle"]
+
+
+def vehicles(record: VerificationRecord) -> int:
+    """Return the number of vehicles that stood still during the recording."""
+    return sum(change.kind == "vehicle" for change in record.changes)
+
+
+def coverage_rows(steps: CoverageSteps) -> list[tuple[str, float, float | None]]:
+    """Return the causes by which coverage differs from the promise, with the coverage after each and its effect."""
+    shares = (steps.promised, steps.pose, steps.obstacles, steps.installed)
+    causes = ("as promised", "sensors where they are", "objects as they are", "gains as they are")
+    effects = (None, *(after - before for before, after in pairwise(shares)))
+    return list(zip(causes, shares, effects, strict=True))
+
+
+def signed_points(effect: float) -> str:
+    """Return a difference of coverage in percentage points, with its sign."""
+    number = round(100 * effect, 1)
+    return f"{'−' if number < 0 else '+' if number > 0 else ''}{abs(number):.1f}"
+
+
+def coverage_text(steps: CoverageSteps) -> str:
+    """Return promised and installed coverage, and what makes the difference."""
+    names = ("poses of the sensors", "changed objects", "gain")
+    effects = [effect for _, _, effect in coverage_rows(steps) if effect is not None]
+    parts = [f"{name} {signed_points(effect)}" for name, effect in zip(names, effects, strict=True)]
+    return (
+        f"The installation sees {steps.installed:.1%} of the road; {steps.promised:.1%} were promised. "
+        f"In percentage points: {', '.join(parts)}."
+    )
+
+
+def summary(record: VerificationRecord) -> tuple[str, ...]:
+    """Return the sentences for a panel: how far each sensor is off, what has changed, and the coverage."""
+    shifts = [(one.id, math.hypot(*one.shift_m), math.hypot(*one.rotation_deg)) for one in record.sensors]
+    off = ", ".join(f"{name} by {shift:.2f} m and {turn:.1f}°" for name, shift, turn in shifts)
+    changes = "; ".join(_named(objects(record))) or "Nothing has changed that the sensors see"
+    return f"Off the plan: {off}.", f"{changes}.", coverage_text(record.coverage)
+
+
+def _named(changes: Sequence[RecordedChange]) -> Iterator[str]:
+    for kind, one, several in (
+        ("new", "object is not in the scene", "objects are not in the scene"),
+        ("gone", "object is no longer there", "objects are no longer there"),
+    ):
+        names = [change.name for change in changes if change.kind == kind]
+        if names:
+            more = f" and {len(names) - _NAMED} more" if len(names) > _NAMED else ""
+            yield f"{counted(len(names), one, several)} ({', '.join(names[:_NAMED])}{more})"
+
+
+def _listed(parts: Sequence[str]) -> str:
+    return " and ".join([", ".join(parts[:-1]), parts[-1]]) if len(parts) > 1 else parts[0]
+
+
+def _within(half: float, per_unit: float, unit: str, single: str = "") -> str:
+    """Return a half width in small units, rounded up."""
+    number = max(1, math.ceil(half * per_unit - 1e-9))
+    return single if number == 1 and single else f"{number:,} {unit}"

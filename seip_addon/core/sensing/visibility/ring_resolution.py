@@ -55,7 +55,7 @@ def resolution_warnings(site: Site, models: Mapping[str, LidarModel], settings: 
         if beyond:
             warnings.append(
                 f"{key}: beyond {', '.join(beyond)} neighbouring rings on a level road are more than "
-                f"2δ = {2 * settings.delta:g} m apart, so the road between them is not seen although nothing hides it"
+                f"{2 * settings.delta:g} m apart, so the road between them is not seen although nothing hides it"
             )
         warnings += _of_tilted(model, site, of_type & ~upright, settings.delta, reach)
     if settings.delta < site.targets.spacing / math.sqrt(2):
@@ -81,7 +81,7 @@ def _of_tilted(model: LidarModel, site: Site, tilted: Boolean, delta: float, rea
     beyond = _limits(model, site, tilted, delta, reach)
     warning = (
         f"{model.key}: if tilted, beyond {', '.join(beyond)} neighbouring rings on a level road in front of it are "
-        f"more than 2δ = {2 * delta:g} m apart, and behind it at a shorter distance, so the road between them is not "
+        f"more than {2 * delta:g} m apart, and behind it at a shorter distance, so the road between them is not "
         "seen although nothing hides it"
     )
     return [warning] if beyond else []

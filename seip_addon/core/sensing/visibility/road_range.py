@@ -83,9 +83,9 @@ def range_warnings(
         assumed = f"; {model.assumed}" if model.assumed else ""
         if beyond >= NEARLY_ALL or assumed:
             warnings.append(
-                f"{key}: detects this road ({reflectivity:.0%} reflectivity) with {settings.detection:.0%} probability "
-                f"up to {reach.max():.0f} m from {heights.max():g} m height"
-                f"{_beyond_message(beyond)}{assumed}"
+                f"{key}: a road surface that reflects {reflectivity:.0%} of the light is detected with "
+                f"{settings.detection:.0%} probability up to {reach.max():.0f} m from {heights.max():g} m height"
+                f"{_beyond_message(beyond)}; vehicles are detected much farther{assumed}"
             )
     return tuple(warnings)
 

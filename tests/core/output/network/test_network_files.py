@@ -12,8 +12,7 @@ import pytest
 import shapely
 
 from seip_addon.core.output.network.network_page import network_page
-from seip_addon.core.output.network.network_record import network_json
-from seip_addon.core.output.network.ranked_sites import gain_text, ranked_sites
+from seip_addon.core.output.network.network_record import gain_text, network_json, ranked_sites
 from seip_addon.core.output.network.write import make_network_report, write_network
 from seip_addon.core.output.report.blocks import Facts
 from tests.builders.invented_network import make_network, make_site, make_streets, network_of

@@ -2,7 +2,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from seip_addon.core.output.pictures.callouts import place_callouts, stack_upwards
+from seip_addon.core.output.pictures.labels import place_callouts, stack_upwards
 from tests.oracles.random_cases import cases
 
 BOUNDS = (0.0, 0.0, 1000.0, 800.0)

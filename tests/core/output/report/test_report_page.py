@@ -15,16 +15,12 @@ from seip_addon.core.errors import SeipError
 from seip_addon.core.output.report.blocks import Card, Facts, Paragraph, Picture, Table
 from seip_addon.core.output.report.evidence import load_evidence
 from seip_addon.core.output.report.html import as_html
-from seip_addon.core.output.report.sections import make_report
-from seip_addon.core.output.report.wording import altitude_zero, proof, returns_within
-from seip_addon.core.output.report.write import write_report
-from seip_addon.core.output.results.costs import costs_of
+from seip_addon.core.output.report.sections import make_report, write_report
+from seip_addon.core.output.report.wording import proof, returns_within
+from seip_addon.core.output.results.answer import costs_of
 from seip_addon.core.output.results.file_names import REPORT_FILES
-from seip_addon.core.output.results.placement_record import RecordedGeoReference
 from seip_addon.core.progress import finish
 from seip_addon.core.site.installed_cost import load_installed_cost
-from seip_addon.core.site.scene_geometry import HEIGHTS_FROM
-from seip_addon.core.site.sources import SourceCount
 from tests.builders.report_folder import CROSSING, NAME, make_folder
 
 EFFORT = 0.2
@@ -246,25 +242,6 @@ def test_bounds_on_returns_are_numbers_of_points_rounded_up(folder):
     alone = text_of(folder, returns=ReturnsSummary(0.26, {"pedestrian": 0.26}, (), (ReturnsPoint(2, 0.26, 1.0, 1.1),)))
     assert "With fewer or more sensors" not in alone
     assert returns_within(0.26, 1.119) == "1.7"
-
-
-@pytest.mark.parametrize(
-    ("changes", "zero"),
-    [
-        ({"sources": (SourceCount("Driving lanes", "extract", 1, 0),), "origin_m": (3.0, 4.0, 0.0)}, "is level"),
-        ({"sources": (SourceCount("Driving lanes", "extract", 1, 0),), "origin_m": (3.0, 4.0, 35.0)}, "map's heights"),
-        ({"assumptions": (f"{HEIGHTS_FROM}hill, 2.tif, 1.0 to 9.0 m, smoothed",)}, "the heights in hill, 2.tif"),
-        ({}, "whose level the map does not give"),
-        (
-            {"geo_reference": RecordedGeoReference("+proj=utm +zone=32 +geoidgrids=egm96.gtx", (0.0, 0.0, 0.0), 0.0)},
-            "egm96.gtx",
-        ),
-    ],
-)
-def test_altitudes_count_from_the_level_that_the_scene_knows(folder, changes, zero):
-    evidence = load_evidence(folder)
-    site = replace(evidence.record.site, **changes)
-    assert zero in altitude_zero(replace(evidence, record=replace(evidence.record, site=site)))
 
 
 def broken(folder, name, content):

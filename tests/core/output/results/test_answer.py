@@ -10,8 +10,14 @@ import pytest
 from seip_addon.core.choosing.placement.objective import ACCEPTED_MESSAGE, MOVED, Objective, Solution
 from seip_addon.core.choosing.placement.problem import Placement
 from seip_addon.core.choosing.placement.returns_summary import CrossingReturns, ReturnsSummary
-from seip_addon.core.output.results.answer import answer, change_text, possible_improvement, recommendation, status_text
-from seip_addon.core.output.results.costs import costs_of
+from seip_addon.core.output.results.answer import (
+    answer,
+    change_text,
+    costs_of,
+    possible_improvement,
+    recommendation,
+    status_text,
+)
 from seip_addon.core.output.results.placement_record import Provenance, placement_record
 from tests.builders.small_junction import make_example
 

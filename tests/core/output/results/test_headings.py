@@ -1,6 +1,6 @@
 import math
 
-from seip_addon.core.output.results.headings import clockwise_degrees, degrees
+from seip_addon.core.geometry.orientation import clockwise_degrees, degrees
 
 
 def test_counter_clockwise_from_zero_to_below_a_full_turn():

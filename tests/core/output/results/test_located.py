@@ -12,9 +12,7 @@ from shapely.geometry import shape
 from seip_addon.core.choosing.placement.objective import Objective, placement_constraints
 from seip_addon.core.errors import SeipError
 from seip_addon.core.geometry.geo_reference import GeoReference
-from seip_addon.core.output.results.geojson import save_geojson
-from seip_addon.core.output.results.kml import NAMESPACE, save_kml
-from seip_addon.core.output.results.located import located
+from seip_addon.core.output.results.geographic_files import NAMESPACE, located, save_geojson, save_kml
 from seip_addon.core.output.results.site_file import load_site_file, save_site_file
 from seip_addon.core.site.scene_geometry import NamedArea
 from tests.builders.report_folder import make_solution

@@ -12,9 +12,18 @@ from seip_addon.core.choosing.placement.problem import Placement
 from seip_addon.core.choosing.placement.returns_summary import CrossingReturns, ReturnsSummary
 from seip_addon.core.errors import SeipError
 from seip_addon.core.geometry.geo_reference import GeoReference
-from seip_addon.core.output.results.placement_file import comparable, load_placement, parsed_record, save_placement
-from seip_addon.core.output.results.placement_record import PlacementRecord, Provenance, placement_record
+from seip_addon.core.output.results.placement_record import (
+    PlacementRecord,
+    Provenance,
+    comparable,
+    load_placement,
+    parsed_record,
+    placement_record,
+    save_placement,
+)
 from seip_addon.core.output.results.versions import versions
+from seip_addon.core.site.scene_geometry import HEIGHTS_FROM
+from seip_addon.core.site.sources import SourceCount
 from tests.builders.small_junction import Example, make_example
 from tests.oracles.json_schema import violations
 from tests.oracles.placement_schema import FILE, text
@@ -112,6 +121,15 @@ def test_a_record_is_written_as_it_was_read(record, tmp_path):
     assert violations(content_of(read), SCHEMA) == []
 
 
+def test_a_record_of_the_version_before_opens(example, run, tmp_path):
+    content = content_of(make_record(example, run)) | {"schema": "seip-placement/3"}
+    del content["site"]["altitude_zero"]
+    (tmp_path / "placement.json").write_text(json.dumps(content), encoding="utf-8")
+    read = load_placement(tmp_path / "placement.json")
+    assert read.sensors == make_record(example, run).sensors
+    assert read.site.altitude_zero == ""
+
+
 def test_the_schema_is_made_from_the_types_of_the_record():
     assert FILE.read_text(encoding="utf-8") == text(), "run python -m tests.oracles.placement_schema"
 
@@ -137,6 +155,24 @@ def test_latitude_and_longitude_are_those_of_the_map_and_its_header(example, run
         assert entry.altitude_m == pytest.approx(entry.map_m[2] + 400.0, abs=1e-6)
         assert entry.latitude_deg == round(entry.latitude_deg, 8)
     assert violations(content_of(record), SCHEMA) == []
+
+
+@pytest.mark.parametrize(
+    ("changes", "zero"),
+    [
+        (
+            {"sources": (SourceCount("Driving lanes", "extract", 1, 0),), "origin": np.array([3.0, 4.0, 0.0])},
+            "is level",
+        ),
+        ({"sources": (SourceCount("Driving lanes", "extract", 1, 0),), "origin": np.array([3.0, 4.0, 35.0])}, "map's"),
+        ({"assumptions": (f"{HEIGHTS_FROM}hill, 2.tif, 1.0 to 9.0 m, smoothed",)}, "the heights in hill, 2.tif"),
+        ({}, "whose level the map does not give"),
+        ({"geo_reference": GeoReference("+proj=utm +zone=32 +geoidgrids=egm96.gtx")}, "egm96.gtx"),
+    ],
+)
+def test_altitudes_count_from_the_level_that_the_scene_knows(example, run, changes, zero):
+    record = make_record(replace(example, site=replace(example.site, **changes)), run)
+    assert zero in record.site.altitude_zero
 
 
 def test_northings_south_of_the_equator_are_those_of_the_southern_zone(example, run):
@@ -168,7 +204,7 @@ def test_the_same_run_gives_the_same_bytes_but_for_times_and_versions(example, r
         ("{", "damaged"),
         ('{"schema": "seip-placement/0"}', "seip-placement/0"),
         (
-            '{"schema": "seip-placement/3", "site": 3}',
+            '{"schema": "seip-placement/4", "site": 3}',
             "json is damaged: site must be an object, not 3; place",
         ),
     ],

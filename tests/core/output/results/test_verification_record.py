@@ -7,8 +7,15 @@ from dataclasses import replace
 import pytest
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.output.results.verification_record import SCHEMA, VerificationRecord, load_verification
-from seip_addon.core.output.results.verification_text import coverage_rows, coverage_text, pose_text, summary
+from seip_addon.core.output.results.verification_record import (
+    SCHEMA,
+    VerificationRecord,
+    coverage_rows,
+    coverage_text,
+    load_verification,
+    pose_text,
+    summary,
+)
 from seip_addon.core.storage.json_dataclass import as_json
 from tests.builders.verification_folder import CHANGES, STEPS, make_pose
 

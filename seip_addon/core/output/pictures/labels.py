@@ -1,10 +1,13 @@
 """Placement of labels without overlaps."""
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
 from ...arrays import Boolean, Float
+from ...geometry.map_view import MapView
+from ...world.street_plan import NamePlaces
 
 Bounds = tuple[float, float, float, float]
 
@@ -20,23 +23,21 @@ def place_callouts(  # what a label must keep off is of several kinds
     """Return the centre of each label's box, (k, 2) float64.
 
     Labels are set one after the other without leaving the picture or touching an anchor or an earlier label: near their
-    anchors, off the subject of the picture, and outwards from the middle of all anchors. Where there is no room near an
-    anchor, its label goes to the nearest free place of the picture, and where none is free, as near as it can.
+    anchors, off the subject of the picture, and outwards from the middle of all anchors. Without room near its anchor a
+    label goes to the nearest free place of the picture, and if none is free, as near as it can.
 
     Parameters
     ----------
-    anchors : (k, 2) float64
-        The points that the labels belong to.
-    sizes : (k, 2) float64
-        Widths and heights of the labels.
+    anchors, sizes : (k, 2) float64
+        Points that the labels belong to, and widths and heights of the labels.
     bounds : (left, bottom, right, top)
         Bounds of the picture, in the unit of the anchors.
     clearance : float
-        To keep between a label and everything else.
+        Distance between a label and everything else.
     subject : (m, 2) float64
-        Evenly spread points of what labels had better not hide.
+        Evenly spread points that labels hide only if there is no other room.
     taken : (n, 4) float64, optional
-        Left, bottom, right and top of boxes in which no label may be.
+        Left, bottom, right and top of boxes without labels.
     """
     low, high = np.array(bounds[:2]), np.array(bounds[2:])
     others = np.empty((0, 4)) if taken is None else taken.reshape(-1, 4)
@@ -49,7 +50,9 @@ def place_callouts(  # what a label must keep off is of several kinds
         tried = _places(anchor, half + 2.0 * clearance, anchor - middle)
         inside = np.all((tried - half >= low) & (tried + half <= high), axis=1)
         free = inside & _is_apart(tried, half + clearance, taken_low, taken_high)
-        cost = np.where(free, _hidden(tried - half, tried + half, subject) + DISTANCE_COSTS, np.inf)
+        within = (subject > (tried - half)[:, None]) & (subject < (tried + half)[:, None])
+        hidden = np.all(within, axis=2).sum(axis=1)  # points of the subject; the most of all places cost 1
+        cost = np.where(free, hidden / max(1, hidden.max()) + DISTANCE_COSTS, np.inf)
         best = int(np.argmin(cost))
         if np.isfinite(cost[best]):
             centre = tried[best]
@@ -69,14 +72,7 @@ def place_callouts(  # what a label must keep off is of several kinds
 def stack_upwards(boxes: Float, gap: float, taken: Float | None = None) -> Float:
     """Return how far up each box must move so that none overlaps another, (k,) float64; the lowest stay.
 
-    Parameters
-    ----------
-    boxes : (k, 4) float64
-        Left, bottom, width and height of each.
-    gap : float
-        Between two boxes, upwards.
-    taken : (n, 4) float64, optional
-        Left, bottom, width and height of boxes that stay, and that the others move above.
+    Boxes (k, 4) are left, bottom, width and height; between two there is a gap. Those in ``taken`` (n, 4) do not move.
     """
     fixed = np.empty((0, 4)) if taken is None else taken
     everything = np.concatenate((fixed, boxes))
@@ -117,8 +113,66 @@ def _places(anchor: Float, reach: Float, outwards: Float) -> Float:
     return np.concatenate([anchor + factor * round_anchor for factor in LABEL_DISTANCES])
 
 
-def _hidden(low: Float, high: Float, subject: Float) -> Float:
-    """Return how much of the subject each box hides, the most of them 1."""
-    inside = np.all((subject > low[:, None]) & (subject < high[:, None]), axis=2).sum(axis=1)
-    share: Float = inside / max(1, inside.max())
-    return share
+MOST_LABELS = 60
+MOST_TRIED = 600
+ROOM = 1.1  # length of a street on the map, in lengths of its name, from which on it is named
+REPEATED = 350.0  # pixels between two labels of one street at least
+SPACE = 4.0  # pixels between labels
+
+
+@dataclass(frozen=True)
+class StreetLabel:
+    """A name on the map, its middle in pixels, and its angle, radians counter-clockwise from -π/2 to π/2."""
+
+    name: str
+    middle: tuple[float, float]
+    angle: float
+
+
+def street_labels(places: NamePlaces, widths: Float, height: float, view: MapView, dots: Float) -> list[StreetLabel]:
+    """Return labels that lie in the frame of a view without overlaps: main streets first, then by length.
+
+    ``widths`` (k,) and ``height`` are those of the names, and ``dots`` (m, 3) have x, y and the radius of dots that no
+    label may cover; all in pixels.
+    """
+    if not len(places.street):
+        return []
+    middles = view.to_pixels(places.positions)
+    wide = widths[places.street]
+    cosine, sine = np.abs(np.cos(places.angles)), np.abs(np.sin(places.angles))
+    half = np.stack((wide * cosine + height * sine, wide * sine + height * cosine), axis=1) / 2.0
+    left, bottom, right, top = view.frame
+    inside = np.all((middles - half >= (left, bottom)) & (middles + half <= (right, top)), axis=1)
+    fits = inside & (places.lengths * view.scale >= ROOM * wide)
+    candidates = np.flatnonzero(fits)
+    from_middle = np.linalg.norm(middles[candidates] - ((left + right) / 2.0, (bottom + top) / 2.0), axis=1)
+    order = np.lexsort((from_middle, -places.lengths[candidates], -places.importance[candidates]))
+    chosen: list[int] = []
+    for one in candidates[order][:MOST_TRIED].tolist():
+        others = np.array(chosen, dtype=np.int64)
+        apart = np.abs(middles[others] - middles[one]) >= half[others] + half[one] + SPACE
+        same = places.street[others] == places.street[one]
+        near = np.linalg.norm(middles[others] - middles[one], axis=1) < REPEATED
+        covers = _covers(middles[one], (float(wide[one]), height), float(places.angles[one]), dots)
+        if apart.any(axis=1).all() and not (same & near).any() and not covers:
+            chosen.append(one)
+        if len(chosen) == MOST_LABELS:
+            break
+    names = [places.names[street] for street in places.street[chosen].tolist()] if chosen else []
+    rows = zip(names, middles[chosen].tolist(), places.angles[chosen].tolist(), strict=True)
+    return [StreetLabel(name, (x, y), angle) for name, (x, y), angle in rows]
+
+
+def _covers(middle: Float, size: tuple[float, float], angle: float, dots: Float) -> bool:
+    """Return whether a turned box covers part of a dot."""
+    cosine, sine = math.cos(angle), math.sin(angle)
+    from_middle = (dots[:, :2] - middle) @ np.array(((cosine, -sine), (sine, cosine)))
+    beyond = np.maximum(np.abs(from_middle) - np.array(size) / 2.0, 0.0)
+    return bool((np.linalg.norm(beyond, axis=1) < dots[:, 2]).any())
+
+
+def start_of(label: StreetLabel, width: float, height: float) -> tuple[float, float]:
+    """Return the pixel at which a label's first letter starts on its base line."""
+    cosine, sine = math.cos(label.angle), math.sin(label.angle)
+    back, down = width / 2.0, height / 2.0
+    return label.middle[0] - back * cosine + down * sine, label.middle[1] - back * sine - down * cosine
