@@ -6,6 +6,8 @@ In a checkout ``python -m headless`` is the same command.
 import runpy
 import sys
 
+from headless.process_end import end_on_signals
+
 VERBS = {
     "build-scene": "build a scene from OpenStreetMap or an OpenDRIVE map",
     "place": "choose the sensors of a scene",
@@ -22,6 +24,7 @@ VERBS = {
 
 def main() -> None:
     """Run the command that the first argument names, with the arguments after it."""
+    end_on_signals()
     request = sys.argv[1] if len(sys.argv) > 1 else "--help"
     if request in {"-h", "--help"}:
         sys.stdout.write(_usage())

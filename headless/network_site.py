@@ -6,12 +6,15 @@ and receives the files.
 
 import pickle
 import sys
+import threading
 from collections.abc import Generator
 from datetime import UTC, datetime
 from pathlib import Path
+from queue import SimpleQueue
 
 from headless import runtime
 from headless.network_tasks import DONE, FORMAT, MEMORY, PLACED_FILES, REQUEST, SURVEY_FILES, PlaceJob, SurveyJob
+from headless.process_end import end_now
 
 import bpy
 
@@ -39,8 +42,10 @@ def main(_: list[str]) -> None:
         import resource  # noqa: PLC0415 -- not on Windows
 
         resource.setrlimit(resource.RLIMIT_DATA, (MEMORY, MEMORY))
-    for line in sys.stdin:
-        folder = Path(line.rstrip("\n"))
+    lines: SimpleQueue[str] = SimpleQueue()
+    threading.Thread(target=_read, args=(lines,), daemon=True).start()
+    while True:
+        folder = Path(lines.get().rstrip("\n"))
         job: SurveyJob | PlaceJob = pickle.loads((folder / REQUEST).read_bytes())  # noqa: S301 -- written by the caller
         try:
             finish(_survey(folder, job) if isinstance(job, SurveyJob) else _place(folder, job))
@@ -49,6 +54,13 @@ def main(_: list[str]) -> None:
                 f"the site needs more than {MEMORY / 2**30:.0f} GiB: shorten the approaches by --approaches"
             ) from error
         runtime.print_line(DONE)
+
+
+def _read(lines: SimpleQueue[str]) -> None:
+    """Read requests; end the process when the worker that writes them ends, even in the midst of one."""
+    for line in sys.stdin:
+        lines.put(line)
+    end_now(0)
 
 
 def _survey(folder: Path, job: SurveyJob) -> Generator[Progress, None, None]:

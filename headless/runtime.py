@@ -15,22 +15,25 @@ import threading
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from types import FrameType
 from typing import NoReturn, TypeVar
 
 # Before numpy is loaded: products shared out to threads depend on their number in the last digit, and take many times
 # as long where other work is on the same cores.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-from headless.process_end import end_without_freeing
+from headless.process_end import end_without_freeing, handle
 from headless.system_libraries import complaint, missing_libraries
 
 from seip_addon.core.acceptance import Acceptance
 from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import Progress, finish, progress_line, reporter
 from seip_addon.core.storage import files as storage
+from seip_addon.scene.interrupts import SIGNALS, held_signals
 
 try:
-    import bpy
+    with held_signals():
+        import bpy
     import defusedxml  # noqa: F401  # first of what the commands stand on, to be missed here rather than anywhere
     import highspy  # noqa: F401
     import matplotlib as mpl  # noqa: F401
@@ -171,18 +174,30 @@ def run(main: Callable[[list[str]], None]) -> NoReturn:
 
 
 def _run(main: Callable[[list[str]], None]) -> NoReturn:
-    signal.signal(signal.SIGINT, signal.default_int_handler)  # Blender leaves SIGINT to the system
-    for number in (signal.SIGTERM, signal.SIGHUP):  # end in good order: half-written files are removed on the way out
-        signal.signal(number, lambda which, _frame: sys.exit(128 + which))
+    received: list[int] = []
+
+    def stop(which: int, _frame: FrameType | None) -> NoReturn:
+        # An exception, so that half-written files are removed on the way out.
+        received.append(which)
+        raise KeyboardInterrupt if which == signal.SIGINT else SystemExit(128 + which)
+
+    signal.signal(signal.SIGINT, stop)  # Blender leaves SIGINT to the system
+    handle(SIGNALS[1:], stop)
     try:
         try:
             main(refuse_pipes(arguments()))
         finally:
             _leave_folders()
-    except SeipError as error:
-        _end(1, f"error: {error}")
-    except KeyboardInterrupt as stop:
-        _end(EXIT_STOPPED, str(stop) or "stopped, no result written")
+    except KeyboardInterrupt as interrupt:
+        _end(EXIT_STOPPED, str(interrupt) or "stopped, no result written")
+    except Exception as error:
+        if received:  # libraries in C that call Python turn the exception of a signal into one of their own
+            _end(128 + received[0], "stopped")
+        if isinstance(error, SeipError):
+            _end(1, f"error: {error}")
+        if isinstance(error, MemoryError):
+            _end(1, "error: there is not enough memory: choose a coarser grid, fewer candidates or smaller files")
+        raise
     _end(0)
 
 

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import asyncio
 import logging
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from tempfile import TemporaryDirectory
 from types import ModuleType
 from typing import Any
 
 from .errors import SeipError
 
 _CONNECT_TIMEOUT = 20  # seconds
+_CLOSE_TIMEOUT = 0.5  # seconds that a worker has to end by itself when the command is interrupted
 _IGNORE_CTRL_C = "import signal; signal.signal(signal.SIGINT, signal.SIG_IGN)"
 """Run by each worker of a cluster on this machine: Ctrl-C reaches all processes of a terminal, and the command ends its
 workers itself."""
@@ -44,7 +47,10 @@ def connected(address: str | None, workers: int = 1) -> Iterator[Any]:
         ) from error
     with dask.config.set({"distributed.admin.large-graph-warning-threshold": "1TB"}):
         if address is None:
+            # Processes that are killed leave their temporary files: those of the workers lie in a folder of this one.
             with (
+                TemporaryDirectory(prefix="seip-", ignore_cleanup_errors=True) as folder,
+                dask.config.set({"temporary-directory": folder}),
                 _empty_main(),
                 LocalCluster(
                     n_workers=workers,
@@ -54,7 +60,9 @@ def connected(address: str | None, workers: int = 1) -> Iterator[Any]:
                     dashboard_address="127.0.0.1:0",
                     silence_logs=50,
                     preload=[_IGNORE_CTRL_C],
+                    env=dict.fromkeys(("TMPDIR", "TEMP", "TMP"), folder),
                 ) as cluster,
+                _ended_with(cluster),
                 Client(cluster, set_as_default=False) as client,
             ):
                 yield client
@@ -74,6 +82,21 @@ def connected(address: str | None, workers: int = 1) -> Iterator[Any]:
                     f"the Dask scheduler at {address} has no workers; start some where this package is installed"
                 )
             yield client
+
+
+@contextmanager
+def _ended_with(cluster: Any) -> Iterator[None]:  # noqa: ANN401 -- Dask has no types
+    """End the workers of a cluster soon after an exception in the block: Dask would wait 4 s for each to finish."""
+    try:
+        yield
+    except BaseException:
+        cluster.sync(_close_workers, cluster)
+        raise
+
+
+async def _close_workers(cluster: Any) -> None:  # noqa: ANN401 -- as above
+    closing = (worker.close(timeout=_CLOSE_TIMEOUT) for worker in cluster.workers.values())
+    await asyncio.gather(*closing, return_exceptions=True)
 
 
 @contextmanager

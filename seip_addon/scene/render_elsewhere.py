@@ -57,7 +57,8 @@ def render_elsewhere(
     request = {"path": sys.path, "blend": str(blend), "scene": scene, "answer": str(answer)}
     pictures = {"raws": [str(raw) for raw in raws], "shots": [shot.as_json() for shot in shots]}
     job.write_text(json.dumps(request | pictures))
-    yield from run_logged(_command(job), log, partial(_samples, len(raws)))
+    temporary = dict.fromkeys(("TMPDIR", "TEMP", "TMP"), str(folder))  # which Blender leaves when it is ended
+    yield from run_logged(_command(job), log, partial(_samples, len(raws)), environment=temporary)
     try:
         taken = [Taken.from_json(one) for one in json.loads(answer.read_text())]
     except OSError as error:

@@ -26,6 +26,8 @@ ROAD_KIND = "Driving lanes"
 LEVEL = 0.5  # metres between the road at the origin and zero in a model without heights
 MOST_PAIRS = 10**9
 """Largest number of candidates times targets: a byte of memory for each, and several times that in a search."""
+MOST_CANDIDATES = 40_000
+"""Largest number of candidates: a search takes two bytes for each pair of them, to exclude those at one position."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,7 +141,7 @@ def make_site(
     triangles, reflectivity = ordered_surfaces((*near.roads, *near.ground, *near.occluders))
     targets = generate_targets(geometry.region, road, grid_spacing, geometry.weighted_regions)
     one_way = any(angle < math.tau for angle in fields_of_view.values())
-    most = MOST_PAIRS / (max(1, len(targets)) * (settings.yaws if one_way else 1))
+    most = min(MOST_PAIRS / max(1, len(targets)), MOST_CANDIDATES) / (settings.yaws if one_way else 1)
     candidates = generate_candidates(geometry, settings, most)
     return Site(
         name=geometry.name,

@@ -72,6 +72,12 @@ def test_what_lies_inside_an_object_is_dropped_and_counted():
     assert candidates.dropped["inside an object"] >= 2
 
 
+def test_candidates_whose_pairs_do_not_fit_in_memory_are_refused():
+    heights = tuple(np.linspace(3.0, 8.0, 401))
+    with pytest.raises(SeipError, match=r"× 401 heights .* at most 40,000 are possible"):
+        make_site(street(), replace(PLAIN, heights=heights, spacing=0.5), 20.0)  # few targets
+
+
 @pytest.mark.parametrize(("above", "free"), [(0.2, False), (0.4, True)])
 def test_a_sensor_keeps_its_clearance_from_what_is_above_it(above, free):
     low = 0.1 + 3.5 + above

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Generator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -12,8 +12,8 @@ from ...arrays import Float
 from ...progress import Progress
 from ..placement.concave import relative_gap
 from ..placement.problem import TIE_TOLERANCE
-from .allocation import allocate, allocation_of, relaxed_allocation
-from .frontier import Frontier, SolvedBudget
+from .allocation import Allocation, allocate, allocation_of, relaxed_allocation
+from .frontier import Frontier, Options, SolvedBudget
 
 FIRST_EFFORT, LAST_EFFORT, GROWTH = 0.25, 64.0, 4.0
 """Counted work of the first and the last search of a budget at a site, and the factor from one to the next."""
@@ -24,6 +24,10 @@ FIRST_SENSORS = (1, 2, 4)
 MANY_SITES = 30
 """Number of sites from which rounds use the linear relaxation: the integer program takes a second for 100 sites. With
 few sites it is fast, and spares searches of amounts that only a mixture of alternatives takes."""
+EXACT_SITES = 1000
+"""Largest number of sites for which the integer program is solved at all: six budgets take half a minute at 1,000
+random sites, and more than three minutes at 3,000. Beyond, the relaxation stands for it to the end: it takes several
+alternatives of one site at most, so that rounding it down loses less than that site is worth."""
 
 
 @dataclass(frozen=True)
@@ -163,15 +167,25 @@ def _relaxed_round(known: Sequence[Frontier], weights: Float, budget: float, gap
     return _unsolved(known, amounts, budget), gap(lower.value, max(lower.value, upper.value))
 
 
+def _allocations(options: Sequence[Options], weights: Float, budget: float) -> tuple[Allocation, Allocation]:
+    """Return an allocation whose value no other exceeds, and one within the budget: the best one if sites are few."""
+    if len(options) <= EXACT_SITES:
+        best = allocate(options, weights, budget)
+        return best, best
+    relaxed = relaxed_allocation(options, weights, budget)
+    lower = allocation_of(options, weights, [parts[0] for parts in relaxed.taken])
+    return replace(lower, value=max(lower.value, relaxed.value)), lower
+
+
 class _Round:
     """Allocations of a budget from what is known of the sites: among placements found, and among bounds."""
 
     def __init__(self, known: Sequence[Frontier], weights: Float, budget: float) -> None:
         self._known, self._weights, self._budget = known, weights, budget
         self._bounding = [one.bounding_options() for one in known]
-        self._upper = allocate(self._bounding, weights, budget)
+        self._upper, _ = _allocations(self._bounding, weights, budget)
         self._found = [one.found_options() for one in known]
-        self._lower = allocate(self._found, weights, budget)
+        _, self._lower = _allocations(self._found, weights, budget)
 
     def gap(self, gap: Gap) -> float:
         """Return the gap between the two."""

@@ -100,6 +100,22 @@ def test_search_finds_the_best_allocation_of_each_budget(seed):
         assert found.price == pytest.approx(math.fsum(one.price for one in found.taken))
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_the_relaxation_of_very_many_sites_loses_less_than_one_site(monkeypatch, seed):
+    monkeypatch.setattr(network_search, "MANY_SITES", 0)
+    monkeypatch.setattr(network_search, "EXACT_SITES", 0)
+    rng = np.random.default_rng(2000 + seed)
+    sites = [EnumeratedSite(rng) for _ in range(4)]
+    weights, budget = rng.choice([0.5, 1.0, 3.0], size=4), float(rng.integers(20, 90) * 1000)
+    known = [site.frontier(budget) for site in sites]
+    (found,) = finish(search_allocations(known, weights, [Goal(budget, 0.0)], solver(sites, 0.05)))
+    best = best_of_all(sites, weights, budget)
+    dearest = max(weight * one.ceiling for weight, one in zip(weights, known, strict=True))
+    assert best - dearest <= found.value <= best * (1 + 1e-9)
+    assert found.bound >= best * (1 - 1e-9)
+    assert found.price <= budget * (1 + 1e-9)
+
+
 @pytest.mark.parametrize("seed", range(2))
 @pytest.mark.usefixtures("rounds")
 def test_a_search_that_ends_early_has_a_bound_that_holds(seed):
