@@ -65,7 +65,7 @@ def error_view(  # noqa: PLR0913 - a frame, how it is evaluated, and where it is
         sensors=sensors[:, :2],
         truth=frame.truth.boxes[:, PLAN_COLUMNS],
         wanted=found.counted,
-        missed=found.counted & (found.found_by == NO_MATCH),
+        missed=found.counted & (found.detection == NO_MATCH),
         detected=shown.detected.boxes[:, PLAN_COLUMNS],
         false=found.evaluated & ~found.hit,
     )

@@ -265,7 +265,7 @@ def part(evaluation: Evaluation, detections: Boolean, wanted: Boolean) -> Evalua
 def _wanted(frames: Sequence[FrameResult], matches: Sequence[Match]) -> CountedTruth:
     truths = [frame.truth for frame in frames]
     score = [
-        np.append(frame.detected.score, MISSED_SCORE)[found.found_by]  # NOBODY is the last
+        np.append(frame.detected.score, MISSED_SCORE)[found.detection]  # NO_MATCH, -1, takes the last
         for frame, found in zip(frames, matches, strict=True)
     ]
     everyone = CountedTruth(
@@ -286,8 +286,8 @@ def _evaluated(frames: Sequence[FrameResult], matches: Sequence[Match]) -> Evalu
         hit=np.concatenate([one.hit for one in matches]),
         frame=np.repeat(np.arange(len(frames)), [len(boxes) for boxes in found]),
         density=np.concatenate([boxes.density for boxes in found]),
-        points=np.concatenate([one.of_found(f.truth.points, f.detected.points) for f, one in pairs]),
-        distance=np.concatenate([one.of_found(f.truth.distance, f.detected.distance) for f, one in pairs]),
+        points=np.concatenate([one.true_values(f.truth.points, f.detected.points) for f, one in pairs]),
+        distance=np.concatenate([one.true_values(f.truth.distance, f.detected.distance) for f, one in pairs]),
     )
     evaluated = np.nonzero(np.concatenate([one.evaluated for one in matches]))[0]
     return _rows(everything, evaluated[np.argsort(-everything.score[evaluated], kind="stable")])

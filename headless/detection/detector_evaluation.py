@@ -115,7 +115,7 @@ def detect_in_runs(  # what measures where, what looks at it, and how
                 with deterministic(threads):
                     found = detect(detector, area, frame)
                 own.append(
-                    frame_result(frame, found, region=region, sensors=placed.places, run=run.name, parked=run.parked)
+                    frame_result(frame, found, region=region, sensors=placed.positions, run=run.name, parked=run.parked)
                 )
     yield Progress(total, total, f"detect with {placed.name}")
     return results

@@ -1,4 +1,4 @@
-"""Simulated frames of runs of traffic for each sensor configuration, made on demand."""
+"""Frames of runs of traffic for any sensor configuration, simulated on demand."""
 
 from __future__ import annotations
 
@@ -36,8 +36,9 @@ class SampledRun:
     Parameters
     ----------
     trajectories : Trajectories
-        In the scene's local axes.
+        Road users in the scene's local axes.
     times : (n,) float64, seconds
+        Instants of the frames.
     """
 
     name: str
@@ -46,24 +47,18 @@ class SampledRun:
 
     @functools.cached_property
     def parked(self) -> Boolean:
-        """Mask of the road users that do not move during the run, (u,) bool."""
+        """Mask of the u road users that do not move during the run, (u,) bool."""
         return parked_users(self.trajectories)
 
     @property
     def key(self) -> str:
-        """Identifier of the run of traffic, whatever its file is called."""
+        """Digest of the trajectories, which does not depend on the name of their file."""
         return digest(self.trajectories.first, self.trajectories.time, self.trajectories.position)
 
 
 @dataclass(frozen=True, eq=False)
 class MountedSensors:
-    """Sensors where they are mounted, to make recordings with.
-
-    Parameters
-    ----------
-    sensors : tuple of MountedSensor
-        Sensors of any types.
-    """
+    """Sensors of any types with their poses, and a name for messages."""
 
     name: str
     sensors: tuple[MountedSensor, ...]
@@ -74,13 +69,26 @@ class MountedSensors:
         return tuple(sorted({sensor.model.key for sensor in self.sensors}))
 
     @property
-    def places(self) -> Float:
-        """Positions of the sensors, (s, 3) in metres."""
+    def positions(self) -> Float:
+        """Positions of the s sensors, (s, 3) in metres."""
         return np.array([sensor.xyz for sensor in self.sensors])
 
 
 def sampled_runs(paths: Sequence[Path], origin: Float, every: float) -> tuple[SampledRun, ...]:
-    """Read runs, each looked at from `WARM_UP` on; see `read_traffic`."""
+    """Read runs, and sample each in equal steps after `WARM_UP` seconds.
+
+    Parameters
+    ----------
+    origin : (3,) float64, metres
+        Origin of the scene's local axes.
+    every : float, seconds
+        Time between frames.
+
+    Raises
+    ------
+    SeipError
+        A run is too short or has too many frames, or the time between frames is out of its range.
+    """
     if not TIME_STEP.allow(every):
         raise SeipError(f"the time between frames must be {TIME_STEP}, not {every:g} s")
     runs = []
@@ -99,21 +107,20 @@ def sampled_runs(paths: Sequence[Path], origin: Float, every: float) -> tuple[Sa
 
 
 class Simulator:
-    """A scene in which runs of traffic are recorded.
+    """Simulator of frames in one scene.
 
-    What stands still is cast against once for a configuration and a run, and
-    cached for a few frames: request the frames of one after the
-    other, in no more threads than there are cores and one.
+    The returns of the static scene are computed once for each configuration and run, and cached for the latest few. So
+    request all frames of one configuration and run before the next, in at most one thread more than there are cores.
 
     Parameters
     ----------
     sensors : sequence of MountedSensor
-        What lies beyond the range of all of them is left out; nothing is where none are given.
+        Objects beyond the range of all these sensors are left out; none are if no sensors are given.
 
     Attributes
     ----------
     area : callable
-        From the width of a pillar in metres to the `DetectionArea` of the scene.
+        Returns the `DetectionArea` of the scene for a width of pillars in metres.
     """
 
     def __init__(self, geometry: SceneGeometry, settings: ScanSettings, sensors: Sequence[MountedSensor] = ()) -> None:
@@ -122,11 +129,11 @@ class Simulator:
         self._simulation = functools.lru_cache(maxsize=2 * ((os.cpu_count() or 1) + 1))(self._prepared)
 
     def forget(self) -> None:
-        """Free the memory of what was cast."""
+        """Free the memory of the cached returns."""
         self._simulation.cache_clear()
 
     def frame(self, configuration: MountedSensors, run: SampledRun, number: int) -> Frame:
-        """Simulate a frame of a run."""
+        """Simulate frame ``number`` of a run."""
         return self._simulation(configuration, run).frame(number, float(run.times[number]))
 
     def _prepared(self, configuration: MountedSensors, run: SampledRun) -> Simulation:
@@ -140,7 +147,7 @@ def poses_key(configuration: MountedSensors) -> str:
 
 
 def frames_key(simulator: Simulator, configuration: MountedSensors, runs: Sequence[SampledRun]) -> str:
-    """Return a digest of all that the frames of some runs follow from."""
+    """Return a digest of all inputs that determine the frames of runs."""
     scans = (
         Run(
             static=simulator.static,

@@ -1,4 +1,4 @@
-"""Settings of the detection network and its training, their limits, and the detector's classes."""
+"""Classes of the detector, and settings of its network and its training."""
 
 from dataclasses import dataclass
 
@@ -13,19 +13,20 @@ CLASS_CATEGORIES = {
 }
 """Classes of the detector and the categories of road users in each.
 
-Cars and vans, and trucks and buses, are similar in sparse clouds. A common class
-avoids confusing them; their sizes are regressed anyway.
+Cars and vans share a class, as do trucks and buses: they are hard to tell apart in sparse clouds, and their sizes are
+regressed anyway.
 """
 
 CLASSES = tuple(CLASS_CATEGORIES)
 CLASS_OF = {category: number for number, group in enumerate(CLASS_CATEGORIES.values()) for category in group}
 """Index of the class of each category of road users."""
 
-GRID_STRIDE = 8  # stride of the network's coarsest feature map in pillars; grids have a multiple of it along each side
-BOTTOM, TOP = -1.0, 4.5  # metres above the road between which a detector looks
+GRID_STRIDE = 8  # stride of the network's coarsest feature map in pillars; the sides of grids are multiples of it
+BOTTOM, TOP = -1.0, 4.5  # metres above the road; points outside are not given to the network
 
 
 def _require(rules: dict[str, bool]) -> None:
+    """Raise the first rule, as a message, that does not hold."""
     for rule, holds in rules.items():
         if not holds:
             raise SeipError(f"detector: {rule}")
@@ -37,20 +38,20 @@ def _is_integer(value: object, least: int, most: int) -> bool:
 
 @dataclass(frozen=True)
 class NetworkSettings:
-    """Settings of the network: pillars, widths and blocks.
+    """Settings of the PointPillars network (Lang et al. 2019): pillars, widths and blocks.
 
     Parameters
     ----------
     pillar : float, metres
         Side of a pillar.
     most_points : int
-        Maximum number of points per pillar; of more a random choice is kept.
+        Maximum number of points per pillar; a random sample is kept of larger numbers.
     width : int
         Channels of the pillar features and of the first block, doubled in the second and in the third.
     blocks : tuple of three int
         Convolutions of each block after the one with stride 2.
     padded : bool
-        Whether pillars are filled up with zero points that are not masked, as an ablation.
+        Whether pillars are filled up with zero points that are not masked: an ablation.
 
     Examples
     --------
@@ -93,16 +94,16 @@ class TrainingSettings:
     steps : int
         Maximum number of weight updates.
     batch : int
-        Windows per step, each of its own sensor configuration, frame and place.
+        Windows per step; each is drawn with its own sensor configuration, frame and position.
     window : float, metres
-        Side of a window. Windows around road users leave out the empty parts of the extent, and many small ones vary
-        more than few large ones.
+        Side of a window, which is cut out around a road user. Many small windows vary more than few large ones, and
+        leave out empty parts of the region.
     learning_rate : float
         Maximum of the one-cycle schedule: warm-up over 30 % of the steps, then cosine annealing (Smith 2018).
     weight_decay : float
         Weight decay of AdamW.
     least_points : int
-        Road users with fewer returns are left out of loss and validation, as targets and as false positives.
+        Road users with fewer returns are ignored in loss and validation, neither required nor false positives.
     validate_every : int
         Steps between validations; each also stores a checkpoint.
     patience : int
@@ -110,20 +111,20 @@ class TrainingSettings:
     seed : int
         Seed of the initial weights and the order of samples.
     threads : int
-        CPU threads of torch. The number determines the order of sums, and so the exact result; one is nearly as fast
-        as two with windows of this size.
+        CPU threads of torch. Their number affects the order of sums, and so the exact result. One is nearly as fast as
+        two with windows of the default size.
     """
 
     steps: int = setting(1800, "updates of the weights", minimum=1)
     batch: int = setting(16, "windows in a step", minimum=1)
     window: float = 25.6
-    learning_rate: float = setting(6e-3, "highest of the schedule", minimum=1e-6, maximum=1.0, metavar="R")
+    learning_rate: float = setting(6e-3, "maximum of the one-cycle schedule", minimum=1e-6, maximum=1.0, metavar="RATE")
     weight_decay: float = 0.01
     least_points: int = 3
     validate_every: int = 300
-    patience: int = setting(3, "validations without improvement before it stops", minimum=1)
-    seed: int = setting(1, "of weights and order", minimum=0)
-    threads: int = setting(1, "of torch on the CPU", minimum=1)
+    patience: int = setting(3, "validations without improvement before training stops", minimum=1)
+    seed: int = setting(1, "seed of the initial weights and the order of samples", minimum=0)
+    threads: int = setting(1, "CPU threads of torch", minimum=1)
 
     def __post_init__(self) -> None:
         rules = {

@@ -151,7 +151,7 @@ def _detected(
         some_points(frame, frame.foreground),
         found,
         region=shared.simulator.static.region,
-        sensors=placement.places,
+        sensors=placement.positions,
         run=run.name,
         parked=run.parked,
     )

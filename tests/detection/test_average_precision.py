@@ -58,7 +58,7 @@ def test_a_car_is_found_once():
     found = match(told, AT_07)
     assert found.hit.tolist() == [True, False]
     assert found.evaluated.tolist() == [True, True]
-    assert found.found_by.tolist() == [0]
+    assert found.detection.tolist() == [0]
     assert average_precision([told]) == 1
 
 

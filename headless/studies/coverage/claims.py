@@ -10,9 +10,12 @@ from .cells import CENTRAL_WEIGHTS, COUNTS, Case, CoverageStudy, Span
 
 MIN_CHANGE = 0.01  # share of the region below which a gain or loss of coverage is negligible
 
+# Coverages are spans, from the least to the largest possible value, as the solver may not have proven the optimum. A
+# claim holds if all values in the spans agree with it, fails if none does, and is undecided otherwise.
+
 
 def coverage_claims(study: CoverageStudy) -> tuple[Claim, ...]:
-    """Evaluate claims 1 to 4 and 10 of the paper on the solved cells.
+    """Evaluate claims 1 to 4 and 10 of the paper on the solved cells, in ascending order.
 
     Claims that compare types, heights or weights are left out if there is nothing to compare.
     """
@@ -27,6 +30,7 @@ def coverage_claims(study: CoverageStudy) -> tuple[Claim, ...]:
 
 
 def _more_is_better(study: CoverageStudy) -> Claim:
+    """Evaluate claim 1: coverage rises with the number of sensors and with a better type."""
     best, (few, most) = study.sensors[-1], COUNTS[-2:]
     shares = {(sensor, n): study.possible(sensor, n) for sensor in study.sensors for n in COUNTS}
     verdicts = [
@@ -35,7 +39,7 @@ def _more_is_better(study: CoverageStudy) -> Claim:
     verdicts += [_rises(shares[b, n], shares[a, n]) for a, b in pairwise(study.sensors) for n in COUNTS]
     gain = _gain(shares[best, most], shares[best, few])
     verdicts.append(UNDECIDED if gain is None else verdict(holds=gain[1] < MIN_CHANGE, fails=gain[0] >= MIN_CHANGE))
-    rows = [f"{sensor} " + ", ".join(_found(shares[sensor, n]) for n in COUNTS) for sensor in study.sensors]
+    rows = [f"{sensor} " + ", ".join(_percentage(shares[sensor, n]) for n in COUNTS) for sensor in study.sensors]
     gained = "" if gain is None else f"; {best} gains {_range(gain)} from N = {few} to {most}"
     return Claim(
         1,
@@ -46,6 +50,7 @@ def _more_is_better(study: CoverageStudy) -> Claim:
 
 
 def _four_of_the_best(study: CoverageStudy) -> Claim:
+    """Evaluate claim 2: the largest number of sensors of the best type covers all, and fewer are enough."""
     best, most = study.sensors[-1], COUNTS[-1]
     text = f"four {best} sensors see 100 %, and fewer would do"
     case, share = study.find(best, most), study.possible(best, most)
@@ -59,11 +64,12 @@ def _four_of_the_best(study: CoverageStudy) -> Claim:
         2,
         text,
         worst_verdict([verdict(holds=_is_full(share), fails=share[1] < 1), verdict(holds=spare, fails=settled)]),
-        f"{_found(share)} with {used} of {most} sensors used",
+        f"{_percentage(share)} with {used} of {most} sensors used",
     )
 
 
 def _heights(study: CoverageStudy) -> Claim:
+    """Evaluate claim 3: the first type is best at the lowest height, the other types at a higher one."""
     lowest, *higher = study.heights
     verdicts, rows = [], []
     for sensor in study.sensors:
@@ -85,6 +91,7 @@ def _heights(study: CoverageStudy) -> Claim:
 
 
 def _weighting(study: CoverageStudy) -> Claim:
+    """Evaluate claim 4: weighting central targets raises their coverage without a loss on the whole."""
     verdicts, rows = [], []
     for sensor in study.sensors:
         plain = study.find(sensor, COUNTS[-1])
@@ -95,6 +102,7 @@ def _weighting(study: CoverageStudy) -> Claim:
             rows.append(f"{sensor}: no placement")
             continue
         changes = [_change(plain, case) for case in cases]
+        # the largest gain in the centre among the weights without a loss on the whole; among all if each has a loss
         cheap = [change for change in changes if change[1] > -MIN_CHANGE]
         gain, loss = max(cheap or changes)
         central, whole = _views(plain)
@@ -121,12 +129,13 @@ def _weighting_verdict(changes: Sequence[tuple[float, float]], proven: Sequence[
 
 
 def _change(plain: Case, weighted: Case) -> tuple[float, float]:
-    """Return the change of the coverage of the centre and of the whole by weighting."""
+    """Return the changes of central and of whole coverage by weighting."""
     (central, whole), (central_after, whole_after) = _views(plain), _views(weighted)
     return central_after - central, whole_after - whole
 
 
 def _views(case: Case) -> tuple[float, float]:
+    """Return the coverage of the central targets and of all."""
     return case.deployment.central or 0.0, case.deployment.coverage
 
 
@@ -135,6 +144,7 @@ def _is_proven(case: Case) -> bool:
 
 
 def _greedy(study: CoverageStudy) -> Claim:
+    """Evaluate claim 10: the greedy algorithm reaches its guarantee (Nemhauser, Wolsey and Fisher 1978)."""
     guarantee = 1 - 1 / math.e
     reached = [(case.greedy.objective, *case.span) for case in study.cases]
     verdicts = [verdict(holds=value >= guarantee * high, fails=value < guarantee * low) for value, low, high in reached]
@@ -149,7 +159,7 @@ def _greedy(study: CoverageStudy) -> Claim:
 
 
 def _rises(more: Span | None, less: Span | None) -> str:
-    """Return the verdict on a non-negligible rise of coverage; it holds, too, if nearly all was covered before."""
+    """Return the verdict on a non-negligible rise of coverage; it also holds if nearly all was covered before."""
     if more is None or less is None:
         return UNDECIDED
     full = 1 - MIN_CHANGE
@@ -160,6 +170,7 @@ def _rises(more: Span | None, less: Span | None) -> str:
 
 
 def _exceeds(more: Span | None, less: Span | None) -> str:
+    """Return the verdict on one coverage being above another."""
     if more is None or less is None:
         return UNDECIDED
     return verdict(holds=more[0] > less[1], fails=more[1] <= less[0])
@@ -177,24 +188,25 @@ def _gain(more: Span | None, less: Span | None) -> Span | None:
 
 
 def _best(spans: Iterable[Span | None]) -> Span | None:
-    """Return the least and largest possible best of several, or None if one of them is missing."""
-    known = list(spans)
-    found = [span for span in known if span is not None]
-    if len(found) < len(known):
-        return None
-    return max(low for low, _ in found), max(high for _, high in found)
+    """Return the span of the maximum of several, or None if one of them is missing."""
+    known = []
+    for span in spans:
+        if span is None:
+            return None
+        known.append(span)
+    return max(low for low, _ in known), max(high for _, high in known)
 
 
 def _best_heights(shares: Mapping[float, Span | None]) -> str:
-    """Return the height with the most coverage in words, or the heights between which there is a tie."""
-    found = {height: span[0] for height, span in shares.items() if span is not None}
-    if not found:
+    """Describe the height with the largest coverage, or the heights that are tied."""
+    coverages = {height: span[0] for height, span in shares.items() if span is not None}
+    if not coverages:
         return "no placement"
-    best = [f"{height:g}" for height, low in found.items() if low == max(found.values())]
+    best = [f"{height:g}" for height, coverage in coverages.items() if coverage == max(coverages.values())]
     return f"{best[0]} m" if len(best) == 1 else f"{'/'.join(best)} m (a tie)"
 
 
-def _found(span: Span | None) -> str:
+def _percentage(span: Span | None) -> str:
     return "no placement" if span is None else f"{span[0]:.1%}"
 
 

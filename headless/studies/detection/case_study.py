@@ -1,13 +1,14 @@
-"""The detection study: average precision of sensor types × numbers, against price and coverage.
+"""The detection study: average precision of each sensor type and number, against price and coverage.
 
-Placements come from the integer program, clouds from simulated traffic. A detector is trained on all placements at
-once, several times with different seeds, and evaluated with each placement on unseen traffic.
+The steps, in order: `place_all` finds the placements with the integer program; `read_traffic` splits the runs of
+traffic; `simulate_training_set` simulates point clouds of training and validation runs; `train_all` trains one detector
+per seed on all placements at once; `evaluate_all` evaluates each detector with each placement on unseen traffic.
 """
 
 import math
 from collections.abc import Generator, Iterable, Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations
+from itertools import chain, combinations
 from pathlib import Path
 
 from headless.detection.average_precision import ADVISED_TEST_RUNS, Evaluation, balanced_score, evaluate
@@ -31,15 +32,15 @@ from seip_addon.core.workflows.survey import Survey
 
 from .claims import SeedResult
 
-MIN_RUNS = 4  # one to learn from, one for validation, two for tests
-STILL_RISING = 0.02  # average precision by which the last validation beats all others where more steps would gain
-RUNS_PER_TEST, RUNS_PER_VALIDATION = 2, 8  # of all runs one half is for tests, and one eighth for validation
-RUNS_PER_CRITERIA = 4  # without training one quarter is for criteria that go by traffic, the others for tests
+MIN_RUNS = 4  # one for training, one for validation, two for tests
+STILL_RISING = 0.02  # lead in average precision of the last validation above which training has not converged
+RUNS_PER_TEST, RUNS_PER_VALIDATION = 2, 8  # one run in 2 is for tests, one in 8 for validation
+RUNS_PER_CRITERIA = 4  # without training, one run in 4 is for criteria that use traffic, the others for tests
 
 SPLIT = "the last half is for tests, an eighth before it (at least one) for validation, the others for training"
 """Split of the runs, as a message."""
 
-TEST_STRIDE = 2  # every second frame is tested: frames shortly after each other are similar, and cost time
+TEST_STRIDE = 2  # only every second frame is tested, as successive frames are similar
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +71,7 @@ class Traffic:
         return (*self.training, *self.validation, *self.test)
 
     def overlap(self) -> str:
-        """Return a message with the overlap of the runs of each pair; see `require_independent`."""
+        """Return a message with the overlap of each pair of runs; see `require_independent`."""
         positions = [vehicle_positions(run.name, run.trajectories) for run in self.runs]
         return require_independent(combinations(positions, 2))
 
@@ -81,8 +82,9 @@ def read_traffic(paths: Sequence[Path], origin: Float, every: float) -> Traffic:
     Parameters
     ----------
     origin : (3,) float64, metres
+        Origin of the scene's local axes.
     every : float, seconds
-        Time between training frames; in the other runs `TEST_STRIDE` times that.
+        Time between training frames; `TEST_STRIDE` times that between validation and test frames.
 
     Raises
     ------
@@ -95,24 +97,24 @@ def read_traffic(paths: Sequence[Path], origin: Float, every: float) -> Traffic:
             f"{RUNS_PER_TEST * ADVISED_TEST_RUNS}, made by `seip traffic` with different seeds; {SPLIT}"
         )
     runs = sampled_runs(paths, origin, every)
-    tested = len(runs) // RUNS_PER_TEST
-    trained_on = len(runs) - tested - max(1, len(runs) // RUNS_PER_VALIDATION)
-    sparse = tuple(replace(run, times=run.times[::TEST_STRIDE]) for run in runs[trained_on:])
-    return Traffic(tuple(runs[:trained_on]), sparse[:-tested], sparse[-tested:])
+    tests = len(runs) // RUNS_PER_TEST
+    training = len(runs) - tests - max(1, len(runs) // RUNS_PER_VALIDATION)
+    sparse = tuple(replace(run, times=run.times[::TEST_STRIDE]) for run in runs[training:])
+    return Traffic(runs[:training], sparse[:-tests], sparse[-tests:])
 
 
 def split_untrained(runs: Sequence[SampledRun]) -> tuple[tuple[SampledRun, ...], tuple[SampledRun, ...]]:
-    """Return the first quarter of some runs (one at least), and the others.
+    """Split runs where nothing is trained: the first quarter (at least one) for criteria, the others for tests.
 
     Raises
     ------
     SeipError
-        There are too few.
+        There are too few runs.
     """
     if len(runs) < MIN_RUNS:
         raise SeipError(f"{len(runs)} runs of traffic are too few: make {MIN_RUNS} or more with seip traffic")
-    known = max(1, len(runs) // RUNS_PER_CRITERIA)
-    return tuple(runs[:known]), tuple(runs[known:])
+    count = max(1, len(runs) // RUNS_PER_CRITERIA)
+    return tuple(runs[:count]), tuple(runs[count:])
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,8 +123,12 @@ class DetectorOutcome:
 
     Parameters
     ----------
+    seed : int
+        Seed of the detector's training.
     score : float
-        Least score of counted false positives: the best balance of precision and recall on validation frames.
+        Score with the highest F1 on validation frames; false positives are counted from this score on.
+    still_rising : bool
+        Whether the training had not converged; see `still_rises`.
     """
 
     seed: int
@@ -159,14 +165,14 @@ def place_all(survey: Survey) -> Generator[Progress, None, tuple[SensorConfigura
     """
     site, models, visible = survey.site, survey.models, survey.grid.visible
     cells = [Cell(sensor, None, count, 1.0) for sensor in models for count in COUNTS]
-    placed: list[Case] = []
+    cases: list[Case] = []
     for done, cell in enumerate(cells):
         progress = Progress(done, len(cells), f"place {cell.count} × {cell.sensor}")
         yield progress
         steps = solve_cell(site, models, visible, cell, survey.settings.limits)
-        placed.append((yield from within(progress, steps)))
+        cases.append((yield from within(progress, steps)))
     yield Progress(len(cells), len(cells), "placed")
-    return tuple(map(SensorConfiguration.of_case, placed))
+    return tuple(map(SensorConfiguration.of_case, cases))
 
 
 @dataclass(frozen=True, eq=False)
@@ -180,27 +186,24 @@ class TrainingSet:
 def simulate_training_set(
     simulator: Simulator, configurations: Sequence[SensorConfiguration], traffic: Traffic, network: NetworkSettings
 ) -> Generator[Progress, None, TrainingSet]:
-    """Simulate the frames of all configurations, and store the training samples of a network."""
+    """Simulate training and validation frames of all configurations, and store them as samples for a network."""
     area = simulator.area(network.pillar)
 
-    def recordings(placed: SensorConfiguration, runs: Sequence[SampledRun]) -> list[SampledRecording]:
-        return [SampledRecording(recorded(simulator, placed, run), area, network.most_points) for run in runs]
+    def samples(configuration: SensorConfiguration, runs: Sequence[SampledRun]) -> list[SampledRecording]:
+        return [SampledRecording(recorded(simulator, configuration, run), area, network.most_points) for run in runs]
 
-    training = {one.name: recordings(one, traffic.training) for one in configurations}
-    validation = {one.name: recordings(one, traffic.validation) for one in configurations}
-    each = [(*training[one.name], *validation[one.name]) for one in most_rays_first(configurations)]
-    yield from side_by_side([simulated(some) for some in each], AT_ONCE)
-    return TrainingSet(
-        [recording for one in configurations for recording in training[one.name]],
-        [recording for one in configurations for recording in validation[one.name]],
-    )
+    training = {one.name: samples(one, traffic.training) for one in configurations}
+    validation = {one.name: samples(one, traffic.validation) for one in configurations}
+    ordered = most_rays_first(configurations)
+    yield from side_by_side([simulate_all([*training[one.name], *validation[one.name]]) for one in ordered], AT_ONCE)
+    return TrainingSet(list(chain(*training.values())), list(chain(*validation.values())))
 
 
 def most_rays_first(configurations: Iterable[SensorConfiguration]) -> list[SensorConfiguration]:
-    """Return configurations in descending number of rays, so that no long work is left to one core at the end."""
+    """Return configurations in descending number of rays, so that no core is left with a long one at the end."""
 
-    def rays(placed: SensorConfiguration) -> int:
-        return sum(sensor.model.channels * sensor.model.azimuth_count for sensor in placed.sensors)
+    def rays(configuration: SensorConfiguration) -> int:
+        return sum(sensor.model.channels * sensor.model.azimuth_count for sensor in configuration.sensors)
 
     return sorted(configurations, key=rays, reverse=True)
 
@@ -212,8 +215,8 @@ def recorded(simulator: Simulator, configuration: MountedSensors, run: SampledRu
     return Recording(name, run.key, frames, configuration.types, simulator.site, poses_key(configuration))
 
 
-def simulated(recordings: Sequence[SampledRecording]) -> Generator[Progress, None, None]:
-    """Simulate all frames of some recordings."""
+def simulate_all(recordings: Sequence[SampledRecording]) -> Generator[Progress, None, None]:
+    """Simulate every frame of recordings."""
     total, done = sum(map(len, recordings)), 0
     for sampled in recordings:
         for number in range(len(sampled)):
@@ -232,12 +235,16 @@ def train_all(  # noqa: PLR0913  # what a training depends on
     device: str,
     start: Detector | None = None,
 ) -> Generator[Progress, None, list[TrainedDetector]]:
-    """Train a detector with each of the seeds from 1 on, on the CPU one on each core.
+    """Train a detector with each of the seeds 1 to ``seeds``, in parallel on the CPU.
 
     Parameters
     ----------
     folder : path
-        Folder of the detectors ``detector-SEED.pt``; a detector that is already there is not trained again.
+        Folder for the detectors, ``detector-SEED.pt``; those already there are not trained again.
+    seeds : int
+        Number of detectors.
+    device : str
+        Torch device, such as ``cpu`` or ``cuda``.
     start : Detector, optional
         Detector with the initial weights; random weights if not given.
     """
@@ -253,12 +260,12 @@ def train_all(  # noqa: PLR0913  # what a training depends on
         )
         for seed in range(1, seeds + 1)
     ]
-    with deterministic(training.threads):  # around all works, as torch has one such setting for all threads
+    with deterministic(training.threads):  # around all trainings, as torch has one setting for all threads
         return (yield from side_by_side(trainings, AT_ONCE if device == "cpu" else 1))
 
 
 def still_rises(curve: LearningCurve) -> bool:
-    """Return whether the last validation beats all before it by more than `STILL_RISING`, or there is but one."""
+    """Return whether the last validation beats all before it by more than `STILL_RISING`, or is the only one."""
     *before, last = curve.validation.values()
     return last > max(before, default=-math.inf) + STILL_RISING
 
@@ -270,20 +277,35 @@ def evaluate_all(
     traffic: Traffic,
     threads: int,
 ) -> Generator[Progress, None, list[DetectorOutcome]]:
-    """Evaluate every detector with each configuration; a frame is simulated once for all of them."""
+    """Evaluate every detector with each configuration; a frame is simulated once for all of them.
+
+    Parameters
+    ----------
+    threads : int
+        CPU threads of torch; their number affects the exact result.
+    """
     ordered, runs = most_rays_first(configurations), (*traffic.validation, *traffic.test)
     detectors = [one.detector for one in trained]
-    works = [detect_in_runs(simulator, one, runs, detectors, threads) for one in ordered]
-    with deterministic(threads):  # around all works, as torch has one such setting for all threads
-        found = yield from side_by_side(works, AT_ONCE)
-    results = {one.name: frames for one, frames in zip(ordered, found, strict=True)}
+    detections = [detect_in_runs(simulator, one, runs, detectors, threads) for one in ordered]
+    with deterministic(threads):  # around all detections, as torch has one setting for all threads
+        results = yield from side_by_side(detections, AT_ONCE)
+    by_name = {one.name: frames for one, frames in zip(ordered, results, strict=True)}
     validated = sum(len(run.times) for run in traffic.validation)
     outcomes = []
-    for number, one in enumerate(trained):
-        own = {name: frames[number] for name, frames in results.items()}
-        known = [frame for each in configurations for frame in own[each.name][:validated]]
-        score, rising = balanced_score(evaluate(known, MAIN_RULE)), still_rises(one.curve)
-        for each in configurations:
-            frames = tuple(own[each.name][validated:])
-            outcomes.append(DetectorOutcome(number + 1, each, frames, evaluate(frames, MAIN_RULE), score, rising))
+    for number, detector in enumerate(trained):
+        frames = [by_name[one.name][number] for one in configurations]
+        # one score for each detector, whatever the sensors
+        score = balanced_score(evaluate(list(chain(*(some[:validated] for some in frames))), MAIN_RULE))
+        for configuration, some in zip(configurations, frames, strict=True):
+            tested = tuple(some[validated:])
+            outcomes.append(
+                DetectorOutcome(
+                    seed=number + 1,
+                    configuration=configuration,
+                    frames=tested,
+                    evaluation=evaluate(tested, MAIN_RULE),
+                    score=score,
+                    still_rising=still_rises(detector.curve),
+                )
+            )
     return outcomes

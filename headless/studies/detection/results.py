@@ -71,7 +71,7 @@ def _save_errors(path: Path, results: StudyResults, outcomes: Sequence[DetectorO
             score=one.score,
             cloud=results.simulator.frame(one.configuration, run, number).points,
             region=results.simulator.static.region,
-            sensors=one.configuration.places,
+            sensors=one.configuration.positions,
         )
         for one in outcomes
     ]

@@ -5,8 +5,8 @@ seip study open-benchmark --criterion mine.csv
 seip study open-benchmark --placement borough placed.blend -o out/benchmark
 seip study open-benchmark --chart borough -o out/benchmark
 
-docs/open-benchmark.md describes it. --criterion needs nothing but the table; the others need torch and
-SUMO (make detection sumo). An interrupted build resumes.
+docs/open-benchmark.md describes the benchmark. --criterion needs only the table; the other actions need torch and SUMO
+(make detection sumo). An interrupted build resumes.
 """
 
 import argparse
@@ -36,14 +36,14 @@ from seip_addon.core.estimates import IntervalEstimate
 from seip_addon.core.storage.csv_table import save_csv
 
 SENSOR, COUNT, PLACEMENTS, EVERY = "os1_128", 2, 100, 10.0
-"""Type and number of sensors of each placement, number of drawn placements at a site, seconds from frame to frame."""
+"""Type and number of sensors of each placement, number of random placements per site, and seconds between frames."""
 TABLE = Path(__file__).resolve().parents[3] / "docs" / "open-benchmark" / "placements.csv"
 SCORE_COLUMNS = ("criterion", "road_users", "sites", "spearman", "low", "high", "loss", "loss_low", "loss_high")
 CRITERIA_FOLDER, TABLE_FILE = "criteria", "placements.csv"
 CHOICE_COLUMNS = ("choice", "loss", "loss_low", "loss_high", "seconds")
 
 TABLE_DETECTOR = "1492989c9f7a925fc2cf1239dc4a1cee90cefd2b76cdd55a300bc3d6da290bc4"
-"""Digest of the detector with which the shipped table was measured; renew it with the table."""
+"""Digest of the detector with which the shipped table was measured; update it with the table."""
 
 
 def main(argv: list[str]) -> None:
@@ -51,8 +51,8 @@ def main(argv: list[str]) -> None:
     options = _parser().parse_args(argv)
     if options.criterion is not None:
         table = read_table(options.table)
-        given = score(options.table, table, read_criterion(options.criterion, table))
-        _print_scores({options.criterion.stem: given, **_known_scores(options.table, table)})
+        scores = score(options.table, table, read_criterion(options.criterion, table))
+        _print_scores({options.criterion.stem: scores, **_known_scores(options.table, table)})
         return
     if options.output is None:
         raise SeipError("name the folder of the benchmark with -o")
@@ -66,7 +66,7 @@ def main(argv: list[str]) -> None:
 
 
 def _build(options: argparse.Namespace) -> None:
-    """Build the sites, evaluate their placements, and write the table of those that are finished."""
+    """Build the sites, evaluate their placements, and write the tables of placements and of scores."""
     from headless.studies.criteria import command as criteria  # noqa: PLC0415 -- needs torch
 
     if options.extracts is None:
@@ -76,12 +76,12 @@ def _build(options: argparse.Namespace) -> None:
         folder = options.output / site.name
         runtime.LOG.info("%s: %s", site.name, site.about)
         scene = runtime.finish_with_bar(build_benchmark_site(site, folder, options.extracts))
-        asked = ["--sensor", SENSOR, "--count", str(COUNT), "--placements", str(PLACEMENTS), "--every", str(EVERY)]
-        criteria.main([str(scene), *asked, "-o", str(folder / CRITERIA_FOLDER)])
+        study = ["--sensor", SENSOR, "--count", str(COUNT), "--placements", str(PLACEMENTS), "--every", str(EVERY)]
+        criteria.main([str(scene), *study, "-o", str(folder / CRITERIA_FOLDER)])
         record = json.loads((folder / CRITERIA_FOLDER / "criteria.json").read_text(encoding="utf-8"))
         rows += table_rows(site.name, record["types"][0]["placements"])
-    save_table(options.output / TABLE_FILE, rows)
     path = options.output / TABLE_FILE
+    save_table(path, rows)
     scores = _known_scores(path, read_table(path))
     figures = [
         (name, one.road_users, one.sites, *_parts(one.spearman, 1.0), *_parts(one.loss, 100.0))
@@ -94,21 +94,22 @@ def _build(options: argparse.Namespace) -> None:
 
 
 def _score_placement(options: argparse.Namespace) -> None:
+    """Evaluate the sensors of a scene at a built site, and print their rank among the placements in the table."""
     from headless.detection.detector import SHIPPED_DETECTOR, Detector  # noqa: PLC0415 -- needs torch
     from headless.studies.open_benchmark.placement import placement_precision  # noqa: PLC0415 -- needs torch
 
     name, scene = options.placement
     (site,) = _chosen([name])
     others = read_table(options.table).get(site.name, [])
-    found, sensors = runtime.finish_with_bar(
+    precisions, sensors = runtime.finish_with_bar(
         placement_precision(options.output / site.name, Path(scene), EVERY, options.output)
     )
-    for road_users, precision in found.items():
+    for road_users, precision in precisions.items():
         column = AP[road_users]
-        known = [float(row[column]) for row in others if row[column]]
-        worse = sum(one < precision.value for one in known)
+        table = [float(row[column]) for row in others if row[column]]
+        worse = sum(value < precision.value for value in table)
         runtime.print_line(
-            f"{road_users}: average precision {precision.describe(1)}, above {worse} of {len(known)} placements of "
+            f"{road_users}: average precision {precision.describe(1)}, above {worse} of {len(table)} placements of "
             f"{COUNT} × {SENSOR}"
         )
     if Detector.load(SHIPPED_DETECTOR).key != TABLE_DETECTOR:
@@ -139,6 +140,7 @@ def _chart(options: argparse.Namespace) -> None:
 
 
 def _chosen(names: Sequence[str]) -> tuple[BenchmarkSite, ...]:
+    """Return the named sites, or all sites without names."""
     sites = {site.name: site for site in read_sites()}
     unknown = next((name for name in names if name not in sites), None)
     if unknown is not None:
@@ -147,7 +149,7 @@ def _chosen(names: Sequence[str]) -> tuple[BenchmarkSite, ...]:
 
 
 def _known_scores(path: Path, table: Placements) -> dict[str, list[CriterionScore]]:
-    """Return the scores of the criteria that the table has."""
+    """Return the scores of the criteria in the table."""
     columns = {key: criterion_column(path, table, key) for key in CRITERIA}
     return {key: score(path, table, values) for key, values in columns.items() if values}
 
@@ -162,6 +164,7 @@ def _print_scores(scores: Mapping[str, Sequence[CriterionScore]]) -> None:
 
 
 def _parts(estimate: IntervalEstimate, scale: float) -> tuple[float, ...]:
+    """Return value, lower and upper bound, each times ``scale``."""
     return scale * estimate.value, scale * estimate.low, scale * estimate.high
 
 

@@ -21,15 +21,15 @@ from seip_addon.core.estimates import IntervalEstimate, student_reach
 from seip_addon.core.storage.csv_table import save_csv
 from seip_addon.core.storage.files import read_small
 
-AP = {name: f"ap_{name.replace('-', '_')}" for name in ("vehicles", "two-wheelers", "pedestrians")}
+AP = {"vehicles": "ap_vehicles", "two-wheelers": "ap_two_wheelers", "pedestrians": "ap_pedestrians"}
 """Columns of average precision by class of road users."""
 HALVES = {name: (f"{column}_first", f"{column}_second") for name, column in AP.items()}
-"""Columns of average precision in the first half of the runs, and in the others."""
+"""Columns of average precision in the first and in the second half of the runs, by class of road users."""
 CRITERIA = ("coverage", "returns", "occupancy_entropy", "egvs", "inspe", "pe_vgop")
 """Columns of criteria, as in `criteria.site_criteria`, which needs torch."""
 COLUMNS = ("site", "placement", "kind", "sensors", *AP.values(), *chain.from_iterable(HALVES.values()), *CRITERIA)
 FEWEST = 4
-"""Placements of a site below which a criterion is not scored there."""
+"""Number of placements of a site below which criteria are not scored there."""
 _MOST_BYTES = 1 << 26
 
 Placements = dict[str, list[dict[str, str]]]
@@ -45,9 +45,9 @@ class CriterionScore:
     sites : int
         Number of sites.
     spearman : IntervalEstimate
-        Rank correlation of the criterion with average precision over a site's placements, mean over sites.
+        Spearman's rank correlation of the criterion with average precision over a site's placements, mean over sites.
     loss : IntervalEstimate
-        Average precision of a site's best placement less that of the placement with the largest value of the
+        Regret: average precision of a site's best placement minus that of the placement with the largest value of the
         criterion, mean over sites.
     """
 
@@ -58,18 +58,24 @@ class CriterionScore:
 
 
 def table_rows(site: str, placements: Sequence[Mapping[str, Any]]) -> Iterator[tuple[object, ...]]:
-    """Yield the rows of a site, from the placements in the record of the criteria study."""
-    for number, one in enumerate(placements, start=1):
-        sensors = "; ".join(" ".join(f"{value:.3f}" for value in xyz) for xyz in one["sensors"])
-        precision = [one["average_precision"].get(name) for name in AP]
-        precision += chain.from_iterable(one["in_halves"].get(name, (None, None)) for name in AP)
-        values = [one["criteria"].get(key) for key in CRITERIA]
-        figures = ["" if value is None or math.isnan(value) else f"{value:.6f}" for value in (*precision, *values)]
-        yield (site, number, one["kind"], sensors, *figures)
+    """Yield the rows of a site.
+
+    Parameters
+    ----------
+    placements : sequence of mapping
+        ``placements`` in the record of the criteria study, ``criteria.json``.
+    """
+    for number, placement in enumerate(placements, start=1):
+        sensors = "; ".join(" ".join(f"{value:.3f}" for value in xyz) for xyz in placement["sensors"])
+        figures = [placement["average_precision"].get(name) for name in AP]
+        figures += chain.from_iterable(placement["in_halves"].get(name, (None, None)) for name in AP)
+        figures += [placement["criteria"].get(key) for key in CRITERIA]
+        cells = ["" if value is None or math.isnan(value) else f"{value:.6f}" for value in figures]
+        yield (site, number, placement["kind"], sensors, *cells)
 
 
 def save_table(path: Path, rows: Sequence[Sequence[object]]) -> None:
-    """Write the table."""
+    """Write rows, as from `table_rows`, with the names of the columns."""
     save_csv(path, COLUMNS, rows)
 
 
@@ -79,7 +85,7 @@ def read_table(path: Path) -> Placements:
     Raises
     ------
     SeipError
-        It is no table of the benchmark.
+        The file is not a table of the benchmark.
     """
     by_site: Placements = {}
     for row in _read_csv(path, ("site", "placement", *AP.values())):
@@ -88,12 +94,17 @@ def read_table(path: Path) -> Placements:
 
 
 def read_criterion(path: Path, table: Placements) -> dict[str, Float]:
-    """Read values of a criterion, a column ``value`` by ``site`` and ``placement``, for all placements of some sites.
+    """Read the values of a criterion from a CSV file with the columns ``site``, ``placement`` and ``value``.
+
+    Returns
+    -------
+    dict of str to (n,) float64
+        Values for the placements of each site in the file, in the order of the table.
 
     Raises
     ------
     SeipError
-        A placement is unknown, missing or there twice, or a value is no number.
+        A placement is unknown, duplicate or missing, or a value is not a number.
     """
     found: dict[str, dict[str, float]] = {}
     for row in _read_csv(path, ("site", "placement", "value")):
@@ -101,7 +112,7 @@ def read_criterion(path: Path, table: Placements) -> dict[str, Float]:
         if placement not in {one["placement"] for one in table.get(site, ())}:
             raise SeipError(f"{path}: the benchmark has no placement {placement} at {site or 'a site without name'}")
         if placement in found.setdefault(site, {}):
-            raise SeipError(f"{path}: placement {placement} at {site} is there twice")
+            raise SeipError(f"{path}: placement {placement} at {site} is duplicate: keep one row")
         found[site][placement] = _number(path, row, "value")
     for site, values in found.items():
         missing = [one["placement"] for one in table[site] if one["placement"] not in values]
@@ -115,7 +126,7 @@ def read_criterion(path: Path, table: Placements) -> dict[str, Float]:
 
 
 def criterion_column(path: Path, table: Placements, key: str) -> dict[str, Float]:
-    """Return the values of a criterion that is a column of the table, at the sites that have it."""
+    """Return the values of a criterion in the table, (n,) float64 for each site where all placements have one."""
     return {site: numbers(path, rows, key) for site, rows in table.items() if all(row.get(key) for row in rows)}
 
 
@@ -137,7 +148,7 @@ def score(path: Path, table: Placements, values: Mapping[str, Float]) -> list[Cr
             if len(rows) < FEWEST or not all(row[column] for row in rows):
                 continue
             precision = numbers(path, rows, column)
-            # A criterion without any differences says nothing: its correlation is undefined, and counts as zero.
+            # The correlation of a constant criterion is undefined; it counts as zero, as it ranks nothing.
             correlations.append(float(np.nan_to_num(rank_agreements(own, precision)[0])))
             losses.append(float(precision.max() - precision[int(np.argmax(own))]))
         if correlations:
@@ -147,18 +158,19 @@ def score(path: Path, table: Placements, values: Mapping[str, Float]) -> list[Cr
 
 
 def mean_over_sites(values: Float) -> IntervalEstimate:
-    """Return the mean of figures of sites, with the 95 % interval by Student's t."""
+    """Return the mean over sites with its 95 % interval by Student's t, which is infinite for a single site."""
     mean = float(values.mean())
     reach = student_reach(values) if len(values) > 1 else math.inf
     return IntervalEstimate(mean, mean - reach, mean + reach)
 
 
 def numbers(path: Path, rows: Sequence[Mapping[str, str]], column: str) -> Float:
-    """Return the numbers in a column of some rows, (n,) float64."""
+    """Return the numbers in a column of rows, (n,) float64; ``path`` is for messages."""
     return np.array([_number(path, row, column) for row in rows])
 
 
 def _read_csv(path: Path, needed: Sequence[str]) -> list[dict[str, str]]:
+    """Read the rows of a CSV file in UTF-8 that has the needed columns; missing cells are empty."""
     text = read_small(path, _MOST_BYTES, "give a table of the benchmark")
     try:
         rows = list(csv.DictReader(io.StringIO(text.decode("utf-8-sig"))))

@@ -1,4 +1,4 @@
-"""The page on the paper's own case, in Markdown: its claims and figures next to ours, and what differs."""
+"""Markdown page on the paper's case study: its claims and figures next to those reproduced, and the differences."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -52,7 +52,7 @@ def page(
     placements: Sequence[PlacementFigures],
     chart: str,
 ) -> str:
-    """Return the page.
+    """Return the page in Markdown.
 
     Parameters
     ----------
@@ -60,10 +60,14 @@ def page(
         Command that writes the page again, without folders.
     facts : mapping of str to str
         Entries of the table of differences: ``scene``, ``criterion``, ``traffic`` and ``training``.
+    study : CoverageStudy
+        Solved placements of each type, height, number and central weight.
     claims : sequence of Claim
         Claims about coverage and about detection.
+    placements : sequence of PlacementFigures
+        Placements measured with detectors; those of one type in ascending number of sensors.
     chart : str
-        Path of the chart of coverage from the page.
+        Path of the chart of coverage, relative to the page.
     """
     parts = [
         "# The paper's own case",
@@ -84,6 +88,7 @@ def page(
 
 
 def _claims(claims: Sequence[Claim]) -> str:
+    """Return the table of the published claims with evidence and verdict."""
     measured = {claim.number: (claim.evidence, f"**{claim.verdict}**") for claim in claims}
     rows = [
         (str(one.number), one.where, one.says, *measured.get(one.number, ("not measured", "–")))
@@ -93,10 +98,11 @@ def _claims(claims: Sequence[Claim]) -> str:
 
 
 def _figures(study: CoverageStudy, placements: Sequence[PlacementFigures]) -> Iterator[str]:
+    """Yield captions and tables of coverage, of central weights, and of average precision."""
     numbers = tuple(f"N = {count}" for count in COUNTS)
     yield "Coverage by type, height and number (section V-A):"
     rows = [
-        (sensor, "any" if height is None else f"{height:g} m", *(_cover(study, sensor, n, height) for n in COUNTS))
+        (sensor, "any" if height is None else f"{height:g} m", *(_coverage(study, sensor, n, height) for n in COUNTS))
         for sensor in study.sensors
         for height in (*study.heights, None)
     ]
@@ -112,7 +118,8 @@ def _figures(study: CoverageStudy, placements: Sequence[PlacementFigures]) -> It
     yield table(("placement", "coverage", "AP", "the paper's gain", "ours", "false"), list(_precisions(placements)))
 
 
-def _cover(study: CoverageStudy, sensor: str, count: int, height: float | None) -> str:
+def _coverage(study: CoverageStudy, sensor: str, count: int, height: float | None) -> str:
+    """Return the largest coverage, with its upper bound if the optimum is not proven."""
     span = study.possible(sensor, count, height)
     if span is None:
         return "no placement"
@@ -121,6 +128,7 @@ def _cover(study: CoverageStudy, sensor: str, count: int, height: float | None) 
 
 
 def _weighted(study: CoverageStudy) -> Iterator[tuple[str, ...]]:
+    """Yield for each type the central and the whole coverage without and with the charted weight."""
     for sensor in study.sensors:
         plain, weighted = study.find(sensor, COUNTS[-1]), study.find(sensor, COUNTS[-1], weight=CHARTED_WEIGHT)
         if plain is not None and weighted is not None:
@@ -130,15 +138,16 @@ def _weighted(study: CoverageStudy) -> Iterator[tuple[str, ...]]:
 
 
 def _precisions(placements: Sequence[PlacementFigures]) -> Iterator[tuple[str, ...]]:
-    before: dict[str, PlacementFigures] = {}
+    """Yield a row for each placement, with its gain over the previous one of the same type."""
+    previous: dict[str, PlacementFigures] = {}
     for one in placements:
-        fewer = before.get(one.sensor)
+        fewer = previous.get(one.sensor)
         theirs = ours = ""
         if fewer is not None:
             step = COUNTS.index(one.count) - 1
             theirs = f"+ {PUBLISHED_GAINS[one.sensor][step]}" if one.sensor in PUBLISHED_GAINS else "not given"
             ours = f"{100 * (one.precision - fewer.precision):+.1f} points"
-        before[one.sensor] = one
-        between = "" if one.interval is None else f" ({one.interval[0]:.1%} to {one.interval[1]:.1%})"
-        precision = f"{one.precision:.1%}{between}"
+        previous[one.sensor] = one
+        interval = "" if one.interval is None else f" ({one.interval[0]:.1%} to {one.interval[1]:.1%})"
+        precision = f"{one.precision:.1%}{interval}"
         yield one.name, f"{one.coverage:.1%}", precision, theirs, ours, f"{one.false_positives:.2f}"

@@ -24,7 +24,7 @@ from headless.detection.recordings import MountedSensors, SampledRun, Simulator,
 from headless.detection.settings import NetworkSettings, TrainingSettings
 from headless.detection.training import train
 from headless.options import add_settings, new_parser, read_settings, real_number
-from headless.studies.detection.case_study import recorded, simulated
+from headless.studies.detection.case_study import recorded, simulate_all
 from headless.studies.random_sites.companions import with_companions
 from headless.studies.random_sites.varied_bodies import resized
 
@@ -148,7 +148,7 @@ def site_recordings(
         for number, (placed, run) in enumerate(drawn)
     ]
     recordings = [SampledRecording(one, area, NETWORK.most_points) for one in scans]
-    yield from side_by_side([simulated([one]) for one in recordings], AT_ONCE)
+    yield from side_by_side([simulate_all([one]) for one in recordings], AT_ONCE)
     simulator.forget()
     return recordings
 

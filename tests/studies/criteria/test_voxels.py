@@ -91,10 +91,10 @@ def test_cells_are_hit_as_every_ray_by_itself_says(key):
         cos, sin = math.cos(vehicles.yaw[number]), math.sin(vehicles.yaw[number])
         axes = np.array([[cos, -sin, 0], [sin, cos, 0], [0, 0, 1]])
         low, size = np.array([-2.25, -0.9, 0.0]), vehicles.size[number]
-        towards = vehicles.place[number] - origin
+        towards = vehicles.position[number] - origin
         near = rays @ towards > np.linalg.norm(towards) * math.cos(math.asin(3 / np.linalg.norm(towards)))
         for ray in rays[near]:
-            start, way = axes.T @ (origin - vehicles.place[number]), axes.T @ ray
+            start, way = axes.T @ (origin - vehicles.position[number]), axes.T @ ray
             met = [
                 (t, axis)
                 for axis in range(3)

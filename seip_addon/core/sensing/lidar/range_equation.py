@@ -6,7 +6,8 @@ From a diffuse (Lambertian) surface that fills the beam, a LiDAR receives the po
 
     p = \frac{ρ \cos θ \, e^{-2 α r}}{r^2}
 
-(Jelalian 1992, *Laser Radar Systems*, section 1.2), and it detects the return with the probability
+(Jelalian 1992, *Laser Radar Systems*, section 1.2; the exponential is the Beer–Lambert law for the way out and back),
+and it detects the return with the probability
 
 .. math::
 
@@ -42,11 +43,11 @@ MAKER_PROBABILITY = 0.9
 DROPOFF_REFLECTIVITY = 0.2
 """Reflectivity, between asphalt and walls, for which `RangeEquation.as_dropoff` is correct."""
 
-# Least ratio of the ranges at 80 and at 10 %: at this one the air leaves 1/178 of the light on the way to the shorter
-# range and back, and with less it would leave even less, which clear air does not.
+# Least ratio of the ranges at 80 and at 10 %. At this ratio the air would transmit only 1/178 of the light on the way
+# to the shorter range and back. A smaller ratio implies even more extinction; data sheets are measured in clear air.
 LEAST_RATIO = 1.3
 
-_TINY = 1e-300
+_TINY = 1e-300  # keeps quotients and logarithms finite where no power is reflected
 _STANDARD = NormalDist()
 
 
@@ -125,7 +126,7 @@ class RangeEquation:
         return replace(law, threshold=at_least - math.log(law.least_strength(probability)))
 
     def in_air(self, extinction: float) -> RangeEquation:
-        """Return the law in air with additional extinction, in 1/m, on the way out and back."""
+        """Return the law in air with additional extinction in 1/m, which applies on the way out and back."""
         return replace(self, extinction=self.extinction + extinction)
 
     def amplified(self, gain: float) -> RangeEquation:
@@ -135,8 +136,8 @@ class RangeEquation:
     def as_dropoff(self) -> CarlaDropoff:
         """Return the drop-off with the same losses at two ranges, for a surface of `DROPOFF_REFLECTIVITY`.
 
-        At these ranges 0.9 and 0.5 of the ceiling are detected from a surface that faces the sensor. CARLA's intensity
-        exp(−a · r) depends on neither reflectivity nor angle.
+        They agree at the ranges where 0.9 and 0.5 of the ceiling are detected from a surface that faces the sensor.
+        CARLA's intensity exp(−a · r) depends on neither reflectivity nor angle.
         """
         near, far = (self.reach(DROPOFF_REFLECTIVITY, share * self.ceiling) for share in (0.9, 0.5))
         attenuation = math.log(0.9 / 0.5) / (far - near)
@@ -182,23 +183,31 @@ class RangeEquation:
         return math.exp(self.threshold + self.spread * _STANDARD.inv_cdf(probability / self.ceiling))
 
     def farthest_on_planes(self, reflectivity: Float, height: Float, least: float) -> Float:
-        """Return a distance (n,) in metres beyond which no plane has a power of ``least``.
+        """Return an upper bound of the distance at which the return from each plane has a power of ``least``.
 
         Parameters
         ----------
+        reflectivity : (n,) float64
         height : (n,) float64, metres
             Height of the sensor above each plane: cos θ is height / r there, so that p falls with r³.
+        least : float, 1/m²
+
+        Returns
+        -------
+        (n,) float64, metres
         """
         strength = reflectivity * height / least
         far: Float = np.cbrt(strength)
         if self.extinction == 0.0:
             return far
-        # f(r) = 3 ln r + 2αr − ln strength grows ever more slowly: the zero of a tangent lies before its own, and that
-        # of the chord from there to r = ∛strength, where f is 2αr, behind it
-        begin = np.maximum(far - 2 * self.extinction * far / (3 / np.maximum(far, _TINY) + 2 * self.extinction), _TINY)
-        below = 3 * np.log(begin) + 2 * self.extinction * begin - np.log(np.maximum(strength, _TINY))
-        above = 2 * self.extinction * far
-        return np.where(below < 0, begin - below * (far - begin) / np.maximum(above - below, _TINY), far)
+        # The distance is the root of f(r) = 3 ln r + 2αr − ln strength, which is increasing and concave. Hence a Newton
+        # step from ∛strength, where f is 2αr, ends before the root, and the chord between these two points crosses
+        # zero beyond it: a bound without iteration.
+        slope = 3 / np.maximum(far, _TINY) + 2 * self.extinction
+        f_far = 2 * self.extinction * far
+        near = np.maximum(far - f_far / slope, _TINY)
+        f_near = 3 * np.log(near) + 2 * self.extinction * near - np.log(np.maximum(strength, _TINY))
+        return np.where(f_near < 0, near - f_near * (far - near) / np.maximum(f_far - f_near, _TINY), far)
 
     def chance(self, distance: Float, reflected: Float) -> Float:
         """Return the probability that each hit is detected, (n,) float64, 0 to `ceiling`.
@@ -223,11 +232,11 @@ class RangeEquation:
         return max(self._reach(reflectivity * height / self.least_strength(probability), 3), 0.0)
 
     def _reach(self, strength: float, power: int) -> float:
-        """Solve strength · exp(−2αr) = rⁿ by bisection."""
+        """Solve strength · exp(−2αr) = rⁿ for r by bisection, with n the ``power``."""
         near, far = 0.0, float(strength ** (1.0 / power))
         if self.extinction == 0.0:
             return far
-        for _ in range(200):  # until no number lies between
+        for _ in range(200):  # until no floating-point number lies between the bounds
             middle = (near + far) / 2.0
             if not near < middle < far:
                 break
