@@ -90,7 +90,7 @@ def make_sections(contents: Mapping[str, Iterable[Block]]) -> tuple[Section, ...
 class Report:
     """A report with the content of its first page.
 
-    ``created`` is the time of the placement (ISO 8601), "" if unknown; the time of the report is not recorded.
+    ``created`` is the time of the placement (ISO 8601); the time of the report is not recorded.
     """
 
     title: str

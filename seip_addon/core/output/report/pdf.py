@@ -57,7 +57,7 @@ def as_pdf(report: Report) -> bytes:
     """
     logging.getLogger("fpdf").setLevel(logging.ERROR)  # it warns of each character that the type lacks
     pdf = _Document(report.title)
-    pdf.set_creation_date(datetime.fromisoformat(report.created) if report.created else None)
+    pdf.set_creation_date(datetime.fromisoformat(report.created))
     pdf.add_page()
     for highest in FIRST_PICTURE_HEIGHTS:
         add = partial(_add_first, report=report, highest=highest)
@@ -148,13 +148,31 @@ def _add_first(pdf: _Document, report: Report, highest: float) -> None:
         _add_block(pdf, block, highest, whole=False)
 
 
-def _add_section(pdf: _Document, section: Section) -> None:
-    pdf.ln(2 * GAP)
-    pdf.need(HEADING_ROOM)
+def _add_heading(pdf: _Document, title: str) -> None:
     if pdf.y > TOP:
-        pdf.set_y(pdf.y - GAP)
+        pdf.set_y(pdf.y + GAP)
         pdf.rule(GAP)
-    pdf.text_lines(section.title, HEADING, style="B")
+    pdf.text_lines(title, HEADING, style="B")
+
+
+def _add_opening(pdf: _Document, section: Section) -> None:
+    """Add the heading of a section and its first block, to see whether they fit on a page together."""
+    _add_heading(pdf, section.title)
+    pdf.ln(GAP)
+    _add_block(pdf, section.blocks[0], whole=False)
+
+
+def _stays_whole(block: Block) -> bool:
+    return isinstance(block, Facts | Card) or (isinstance(block, Table) and len(block.rows) <= MOST_TOGETHER)
+
+
+def _add_section(pdf: _Document, section: Section) -> None:
+    first = section.blocks[0]
+    together = _stays_whole(first) or all(isinstance(block, Picture) for block in section.blocks)
+    room = pdf.has_room(partial(_add_opening, section=section)) if together else not pdf.will_page_break(HEADING_ROOM)
+    if not room and pdf.y > TOP:
+        pdf.add_page()
+    _add_heading(pdf, section.title)
     waiting: list[Picture] = []  # that the rest of the page has no room for
     for block in section.blocks:
         if isinstance(block, Picture):
@@ -174,7 +192,7 @@ def _add_below(pdf: _Document, block: Block) -> None:
 
 def _add_block(pdf: _Document, block: Block, highest: float = MAX_PICTURE_HEIGHT, *, whole: bool = True) -> None:
     """Add a block; pictures up to a height, and facts and the like on one page if they are to stay whole."""
-    if whole and (isinstance(block, Facts | Card) or (isinstance(block, Table) and len(block.rows) <= MOST_TOGETHER)):
+    if whole and _stays_whole(block):
         pdf.add_whole(partial(_add_block, block=block, whole=False))
     elif isinstance(block, Paragraph):
         pdf.text_lines(block.text, BODY)

@@ -19,7 +19,7 @@ from seip_addon.core.output.report.blocks import (
     Section,
     Table,
 )
-from seip_addon.core.output.report.pdf import BOTTOM, as_pdf
+from seip_addon.core.output.report.pdf import BOTTOM, HEADING, as_pdf
 from tests.few import few
 
 PAGE = 842.0  # points
@@ -32,17 +32,25 @@ def png(width, height):
     return content.getvalue()
 
 
-def lowest_marks(pdf):
-    """Return how far down each page texts and pictures reach, above its foot; points from the top."""
-    lowest = []
+def pages_of(pdf):
+    """Yield for each page the size of type and the height of its texts, from the foot of the page, and the pictures."""
     for packed in re.findall(rb"/Filter /FlateDecode\n/Length \d+\n>>\nstream\n(.*?)\nendstream", pdf, re.DOTALL):
         page = zlib.decompress(packed)
         if b" Td " not in page:
             continue
-        texts = [float(y) for y in re.findall(rb"BT [\d.]+ ([\d.]+) Td", page)]
+        size, texts = 0.0, []
+        for chosen, y in re.findall(rb"/F\d+ ([\d.]+) Tf|BT [\d.]+ ([\d.]+) Td", page):
+            if chosen:
+                size = float(chosen)
+            else:
+                texts.append((size, float(y)))
         images = [float(y) for y in re.findall(rb"q [\d.]+ 0 0 [\d.]+ [\d.]+ ([\d.]+) cm", page)]
-        lowest.append(PAGE - min(y for y in (*texts, *images) if y > BOTTOM - 1.0))
-    return lowest
+        yield [(size, y) for size, y in texts if y > BOTTOM - 1.0], [y for y in images if y > BOTTOM - 1.0]
+
+
+def lowest_marks(pdf):
+    """Return how far down each page texts and pictures reach, above its foot; points from the top."""
+    return [PAGE - min([*(y for _, y in texts), *images]) for texts, images in pages_of(pdf)]
 
 
 def sections(seed):
@@ -74,3 +82,26 @@ def test_pages_are_more_than_half_full(seed):
     *pages, _ = lowest_marks(as_pdf(report))
     assert len(pages) > 4
     assert min(pages) > 0.5 * PAGE
+
+
+@pytest.mark.parametrize("filled", few((38, 41, 44, *range(30, 38), 39, 40, 42, 43), 3))
+def test_no_heading_ends_a_page(filled):
+    """Whatever precedes it, the first block of a section that stays whole is on the page of its heading."""
+    rows = tuple((str(row), TEXT) for row in range(9))
+    firsts = (Table(("Number", "Text"), rows), Facts(rows), Card("S1", (Facts(rows),)), Picture(png(600, 400), "View"))
+    for first in firsts:
+        before = Section("Before", (Bullets(("Line",) * filled),))
+        report = Report(
+            "Crossing",
+            "Positions",
+            "2026-01-02T03:04:05+00:00",
+            (Paragraph(TEXT),),
+            (before, Section("After", (first,))),
+        )
+        headings = 0
+        for texts, images in pages_of(as_pdf(report)):
+            below = [*(y for size, y in texts if size != HEADING), *images]
+            for _, heading in filter(lambda text: text[0] == HEADING, texts):
+                assert min(below) < heading
+                headings += 1
+        assert headings == 2
