@@ -50,10 +50,14 @@ class Confidence:
     def of_detector(cls, path: Path, detector: Detector) -> Confidence:
         """Read the file next to a detector's file; without one, confidence is the score."""
         path = path.with_suffix(SUFFIX)
-        if not path.exists():
-            return cls(detector.key, dict.fromkeys(CLASSES, (1.0, 0.0)))
         cure = "fit it again with headless/studies/fit_confidence.py, or remove it"
-        known = read_record(cls, path.read_bytes(), (SCHEMA,), path.name, cure)
+        try:
+            content = path.read_bytes()
+        except FileNotFoundError:
+            return cls(detector.key, dict.fromkeys(CLASSES, (1.0, 0.0)))
+        except OSError as error:
+            raise SeipError(f"cannot read {path.name}: {error.strerror}; {cure}") from error
+        known = read_record(cls, content, (SCHEMA,), path.name, cure)
         if known.detector != detector.key:
             raise SeipError(f"{path.name} belongs to another detector: {cure}")
         if set(known.maps) != set(CLASSES) or min(slope for slope, _ in known.maps.values()) <= 0.0:
