@@ -19,6 +19,7 @@ from ..progress import Progress, altered
 from ..sensing.returns.returns_grid import compute_returns
 from ..sensing.returns.road_users import road_users
 from ..sensing.visibility.grid import compute_visibility
+from ..sensing.visibility.store import read_visibility
 from .returns import SurveyReturns
 from .survey import Layout
 
@@ -41,7 +42,8 @@ def early_answer(
     Parameters
     ----------
     grid_file : path
-        File of the visibility grid. If it exists, the search begins at once, and there is no early answer.
+        File of the visibility grid. If it is that of the layout, the search begins at once, and there is no early
+        answer.
     threads : int, optional
         Maximum number of threads.
 
@@ -51,7 +53,10 @@ def early_answer(
         "" without an early answer: also for a coverage or a risk measure to be met, and if these poses do not allow
         what the objective demands.
     """
-    if objective.cheapest or objective.measure is not None or grid_file.exists():
+    settings = layout.settings
+    if objective.cheapest or objective.measure is not None:
+        return ""
+    if read_visibility(grid_file, layout.site, layout.models, settings.visibility, settings.engine) is not None:
         return ""
     poses = few_poses(layout, objective)
     few = replace(layout, site=replace(layout.site, candidates=layout.site.candidates.only(poses)))

@@ -61,8 +61,10 @@ def test_the_few_have_all_heights_and_types_and_the_required_positions():
 def test_there_is_none_for_a_stored_grid_a_coverage_or_what_the_few_do_not_allow(small_survey, tmp_path, monkeypatch):
     objective = Objective(count=2, criterion="road")
     stored = tmp_path / "visibility.npz"
-    stored.touch()
+    small_survey.grid.save(stored)
     assert not finish(early.early_answer(small_survey, objective, stored))
+    replace(small_survey.grid, key="of other inputs").save(stored)
+    assert finish(early.early_answer(small_survey, objective, stored))
     cheapest = replace(objective, count=None, coverage=0.5)
     assert not finish(early.early_answer(small_survey, cheapest, tmp_path / "none.npz"))
     far_apart = replace(objective, min_distance=1e4)

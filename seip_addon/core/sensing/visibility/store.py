@@ -97,10 +97,9 @@ def stored_visibility(  # noqa: PLR0913, PLR0917  # the inputs of the grid, and 
     VisibilityGrid
         Grid for these inputs.
     """
-    key = visibility_key(site, models, settings, engine_name(engine))
-    stored = _load(path)
-    checkpoint = CheckpointFolder(path, key)
-    if stored is not None and stored.key == key and stored.shape == (len(site.candidates), len(site.targets)):
+    stored = read_visibility(path, site, models, settings, engine)
+    checkpoint = CheckpointFolder(path, visibility_key(site, models, settings, engine_name(engine)))
+    if stored is not None:
         checkpoint.remove()  # left by a process that was killed after it had written the grid
         yield Progress(len(site.candidates), len(site.candidates), "visibility, from an earlier run")
         return stored
@@ -110,12 +109,16 @@ def stored_visibility(  # noqa: PLR0913, PLR0917  # the inputs of the grid, and 
     return grid
 
 
-def _load(path: Path) -> VisibilityGrid | None:
-    """Return the grid of a file, or None if there is no usable one."""
+def read_visibility(
+    path: Path, site: Site, models: Mapping[str, LidarModel], settings: VisibilitySettings, engine: Engine = "auto"
+) -> VisibilityGrid | None:
+    """Return the grid of a file, or None if it is not one that was computed from the same inputs."""
     try:
-        return VisibilityGrid.load(path)
+        stored = VisibilityGrid.load(path)
     except SeipError:
         return None
+    key, shape = visibility_key(site, models, settings, engine_name(engine)), (len(site.candidates), len(site.targets))
+    return stored if stored.key == key and stored.shape == shape else None
 
 
 class GridFolder:
