@@ -351,13 +351,13 @@ def _exported(folder: Path, scene: bpy.types.Scene) -> Generator[Progress, None,
         survey, solution = state.placed()
         record = parsed_record(state.record)
         record = replace(record, settings={**record.settings, "render": render})
-        yield from write_tables(part, survey, solution, record)
+        plans = yield from write_tables(part, survey, solution, record)
         deployment = solution.deployment
         with TemporaryDirectory(prefix="seip-") as raw:
             rendered = None
             if render:
                 rendered = yield from render_elsewhere(Path(raw), part["placed.blend"], name, survey.site, deployment)
-            write_pictures(part, survey, record, deployment, rendered, legend)
+            write_pictures(part, survey, record, deployment, plans, rendered, legend)
     survey.grid.save(folder / "visibility.npz")
     return state
 

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterator, Mapping
+from collections.abc import Generator, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import bpy
+from PIL import Image
 
 from ..core.choosing.placement.deployment import Deployment
 from ..core.choosing.placement.objective import Solution, placement_constraints
 from ..core.errors import SeipError
-from ..core.output.pictures.close_ups import save_close_ups
+from ..core.output.pictures.close_ups import draw_plans, save_close_ups
 from ..core.output.pictures.colours import Legend, packed_counts
 from ..core.output.pictures.labelled_view import save_labelled_view
 from ..core.output.pictures.plan_view import save_plan_view
@@ -111,9 +112,9 @@ def write_result_folder(
                 if render:
                     next(pictures)  # starts the other Blender, which renders while this one writes
                 save_glb(part["scene.glb"], site.attribution)
-                yield from write_tables(part, survey, solution, record)
+                plans = yield from write_tables(part, survey, solution, record)
                 rendered = (yield from pictures) if render else None
-            write_pictures(part, survey, record, deployment, rendered, shown_legend(scene))
+            write_pictures(part, survey, record, deployment, plans, rendered, shown_legend(scene))
 
 
 def _save_placed(
@@ -130,8 +131,8 @@ def _save_placed(
 
 def write_tables(
     part: Mapping[str, Path], survey: Survey, solution: Solution, record: PlacementRecord
-) -> Generator[Progress, None, None]:
-    """Write the files of a result that do not depend on Blender's data; see `write_result_folder`."""
+) -> Generator[Progress, None, list[Image.Image]]:
+    """Write the files of a result that do not depend on Blender's data; return the plans of the sensors' close-ups."""
     geometry, site, models, deployment = survey.geometry, survey.site, survey.models, solution.deployment
     yield Progress(0, 3, "writing tables", counted=False)
     save_placement(part["placement.json"], record)
@@ -149,19 +150,21 @@ def write_tables(
     yield Progress(2, 3, "drawing the plan", counted=False)
     created = record.times.created
     save_plan_view(part["plan.png"], geometry, site, deployment, solution.caption, created=created)
+    return draw_plans(geometry, site, deployment)
 
 
-def write_pictures(
+def write_pictures(  # noqa: PLR0913, PLR0917  # what all pictures show
     part: Mapping[str, Path],
     survey: Survey,
     record: PlacementRecord,
     deployment: Deployment,
+    plans: Sequence[Image.Image],
     rendered: RenderedPictures | None,
     legend: Legend | None,
 ) -> None:
     """Write the rendered view with its labels, and the close-ups of the sensors; without rendering only their plans."""
-    geometry, site, created = survey.geometry, survey.site, record.times.created
+    site, created = survey.site, record.times.created
     if rendered is not None:
         save_labelled_view(part["view.png"], rendered.view, site, deployment, legend, rendered.sight, created=created)
     views, places = ((), {}) if rendered is None else (rendered.close_ups, rendered.places)
-    save_close_ups(part["sensors.png"], geometry, site, deployment, views, places)
+    save_close_ups(part["sensors.png"], plans, views, places, site.attribution)

@@ -60,26 +60,34 @@ def viewpoints(site: Site, sensor: Sensor) -> list[Viewpoint]:
     return [frame(points, towards + turn, elevation, SLOPES) for elevation in ELEVATIONS for turn in TURNS]
 
 
-def save_close_ups(  # what both kinds of pictures show
+def draw_plans(geometry: SceneGeometry, site: Site, deployment: Deployment) -> list[Image.Image]:
+    """Return the plan of each sensor's surroundings, of the size `TILE`, for at most `MOST` sensors."""
+    content = map_content(geometry, site, deployment, site.region.buffer(REACH).bounds)
+    return [_plan(content, sensor) for sensor in deployment.sensors[:MOST]]
+
+
+def save_close_ups(
     path: str | os.PathLike[str],
-    geometry: SceneGeometry,
-    site: Site,
-    deployment: Deployment,
+    plans: Sequence[Image.Image],
     views: Sequence[Image.Image],
     places: Mapping[str, tuple[float, float]],
+    attribution: Sequence[str],
 ) -> None:
     """Write a sheet with the plan and the view of each sensor's surroundings, as PNG; without views only the plans.
 
-    ``views`` are of the size `TILE`, in the order of the sensors; ``places`` has the position of each sensor on its
-    view, by its label, in shares of width and height from the lower left.
+    Parameters
+    ----------
+    plans, views : sequence of Image
+        Of the size `TILE`, in the order of the sensors. No file is written without sensors.
+    places : mapping of str to (float, float)
+        Position of each sensor on its view, by its label and in the same order, in shares of width and height from the
+        lower left.
     """
-    sensors = deployment.sensors[:MOST]
-    if not sensors:
+    if not plans:
         return
-    content = map_content(geometry, site, deployment, site.region.buffer(REACH).bounds)
-    rows = [[_plan(content, sensor)] for sensor in sensors]
-    for row, view, sensor in zip(rows, views, sensors, strict=False):
-        row.append(_labelled(view, sensor, places[sensor.label], site.attribution))
+    rows = [[plan] for plan in plans]
+    for row, view, (label, place) in zip(rows, views, places.items(), strict=False):
+        row.append(_labelled(view, label, place, attribution))
     with whole_file(path) as temporary:
         close_up_sheet(rows).save(temporary, format="PNG")
 
@@ -113,7 +121,7 @@ def _mark(axes: Axes, content: MapContent, sensor: Sensor, window: Window, taken
         axes.plot(*one.xyz[:2], marker=markers[one.model.key], zorder=SENSOR, **style)
 
 
-def _labelled(view: Image.Image, sensor: Sensor, place: tuple[float, float], attribution: Sequence[str]) -> Image.Image:
+def _labelled(view: Image.Image, label: str, place: tuple[float, float], attribution: Sequence[str]) -> Image.Image:
     """Return a rendered close-up with a ring round the sensor and its label."""
     width, height = SIZE
     figure = new_page(SIZE, DPI)
@@ -124,7 +132,7 @@ def _labelled(view: Image.Image, sensor: Sensor, place: tuple[float, float], att
     axes.imshow(np.asarray(paper), extent=(0.0, width, 0.0, height), interpolation="nearest", aspect="auto")
     axes.set(xlim=(0.0, width), ylim=(0.0, height))
     point = np.array(place) * (width, height)
-    draw_callouts(axes, point[None], [sensor.label], point[None], 2.0)
+    draw_callouts(axes, point[None], [label], point[None], 2.0)
     ring: Style = {"marker": "o", "mfc": "none", "markersize": 2.6 * MARK_RADIUS, "linestyle": "none"}
     axes.plot(*point, mec=PAPER, mew=4.0, zorder=3.0, **ring)
     axes.plot(*point, mec=INK, mew=2.0, zorder=3.1, **ring)
