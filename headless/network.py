@@ -17,7 +17,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from headless import runtime, survey
-from headless.network_run import NetworkRequest, run_network
+from headless.network_run import PROBLEM, NetworkRequest, run_network
 from headless.network_tasks import FORMAT, MEMORY, survey_version
 from headless.options import add_settings, new_parser, real_number, whole_number
 
@@ -35,6 +35,7 @@ from seip_addon.core.progress import finish
 from seip_addon.core.sensing.visibility.ray_casting import engine_name
 from seip_addon.core.site.installed_cost import DEFAULTS
 from seip_addon.core.storage.files import read_small
+from seip_addon.core.sumo_programs import find_sumo
 from seip_addon.core.workflows.network_sites import (
     APPROACHES,
     NetworkPlace,
@@ -80,6 +81,8 @@ def main(argv: list[str]) -> None:
         settings=settings,
         objective=objective,
     )
+    if options.scheduler is None:
+        _check_sumo(places, options.output)
     number = options.workers or _usual_workers()
     _confirm(options, len(places), number)
     source = _Sources(request)
@@ -164,6 +167,12 @@ def _area(path: Path) -> shapely.Geometry:
     if fault := Limits.first_fault({"a longitude": (longitude, LONGITUDE), "a latitude": (latitude, LATITUDE)}):
         raise SeipError(f"{path}: {fault}; GeoJSON has longitude before latitude, in degrees")
     return area
+
+
+def _check_sumo(places: Sequence[NetworkPlace], folder: Path) -> None:
+    """Refuse sites of extracts without SUMO before any site is built, unless they are surveyed already."""
+    if any(is_extract(place.source) and not (folder / place.folder / PROBLEM).is_file() for place in places):
+        find_sumo()
 
 
 def _memory() -> float:

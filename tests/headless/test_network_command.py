@@ -13,6 +13,7 @@ from headless import network
 
 import pytest
 
+from seip_addon.core import sumo_programs
 from seip_addon.core.errors import SeipError
 from seip_addon.core.output.network.network_record import NetworkRecord
 from seip_addon.core.storage.json_dataclass import from_json
@@ -125,3 +126,14 @@ def test_long_runs_without_a_terminal_need_to_be_confirmed(tmp_path, monkeypatch
     table.write_text(f"source,latitude,longitude\n{rows}", encoding="utf-8")
     with pytest.raises(SeipError, match="--yes"):
         network.main([str(table), "-o", str(tmp_path / "city"), "--budget", "1000", "--workers", "1"])
+
+
+def test_an_extract_without_sumo_is_refused_before_anything_is_built(tmp_path, monkeypatch):
+    town, output = JUNCTION.with_name("town.osm"), tmp_path / "town"
+    monkeypatch.setenv("PATH", "")
+    monkeypatch.delenv("SUMO_HOME", raising=False)
+    monkeypatch.setattr(sumo_programs.importlib.util, "find_spec", lambda _: None)
+    monkeypatch.setattr(network, "run_network", lambda *_: pytest.fail("it began to build sites"))
+    with pytest.raises(SeipError, match="SUMO is not installed"):
+        network.main([str(town), "--junctions", "all", "--budget", "150_000", "-o", str(output), "--workers", "1"])
+    assert not list(output.iterdir())
