@@ -5,15 +5,19 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
+from typing import TypeVar
 
 import numpy as np
 
 from ...arrays import Float
-from ...progress import Progress
+from ...progress import Progress, in_thread
 from ..placement.concave import relative_gap
 from ..placement.problem import TIE_TOLERANCE
 from .allocation import Allocation, allocate, allocation_of, relaxed_allocation
 from .frontier import Frontier, Options, SolvedBudget
+
+Result = TypeVar("Result")
 
 FIRST_EFFORT, LAST_EFFORT, GROWTH = 0.25, 64.0, 4.0
 """Counted work of the first and the last search of a budget at a site, and the factor from one to the next."""
@@ -141,9 +145,11 @@ def search_allocations(
             least = min(goal.tolerance for goal in open_goals if goal.budget == budget)
             wanted[budget], gaps[budget] = [], math.inf
             if len(known) >= MANY_SITES:
-                wanted[budget], gaps[budget] = _relaxed_round(known, weights, budget, gap)
+                wanted[budget], gaps[budget] = yield from _reporting(
+                    partial(_relaxed_round, known, weights, budget, gap)
+                )
             if not wanted[budget] and gaps[budget] > least:
-                exact = _Round(known, weights, budget)
+                exact = yield from _reporting(partial(_Round, known, weights, budget))
                 wanted[budget], gaps[budget] = exact.requests(), exact.gap(gap)
         requests = {
             goal: [one for one in wanted[goal.budget] if one.effort <= goal.effort]
@@ -152,7 +158,16 @@ def search_allocations(
         }
         open_goals = [goal for goal, own in requests.items() if own]
         known = yield from _solved(known, set().union(*requests.values()), solve)
-    return tuple(_Round(known, weights, goal.budget).allocation() for goal in goals)
+    allocations = []
+    for goal in goals:
+        last = yield from _reporting(partial(_Round, known, weights, goal.budget))
+        allocations.append(last.allocation())
+    return tuple(allocations)
+
+
+def _reporting(work: Callable[[], Result]) -> Generator[Progress, None, Result]:
+    """Return the result of a function, and go on reporting: with many sites its programs take half a minute."""
+    return in_thread(lambda _: work(), "allocating the money")
 
 
 def _relaxed_round(known: Sequence[Frontier], weights: Float, budget: float, gap: Gap) -> tuple[list[Request], float]:
