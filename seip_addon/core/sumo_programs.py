@@ -1,4 +1,7 @@
-"""Search for and execution of the programs of SUMO (Eclipse Simulation of Urban MObility), an optional extra."""
+"""Search for and execution of the programs of SUMO (Eclipse Simulation of Urban MObility), an optional extra.
+
+Its use is shown in `tests/core/test_sumo_installation.py`.
+"""
 
 import importlib.util
 import os

@@ -20,8 +20,7 @@ from PIL import Image
 from ..core.arrays import Boolean, Float
 from ..core.choosing.placement.deployment import Deployment
 from ..core.errors import SeipError
-from ..core.output.pictures.close_ups import MOST, TILE, Viewpoint, frame, viewpoints
-from ..core.output.pictures.labelled_view import Sight
+from ..core.output.pictures.viewpoint import MOST, TILE, Sight, Viewpoint, frame, viewpoints
 from ..core.site.site import Site
 from . import contract
 from .daylight import add_daylight

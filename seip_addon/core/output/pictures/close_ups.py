@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import io
-import math
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 import shapely
@@ -14,7 +12,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from PIL import Image
 
-from ...arrays import Float
 from ...choosing.placement.deployment import Deployment, Sensor
 from ...site.scene_geometry import SceneGeometry
 from ...site.site import Site
@@ -34,30 +31,11 @@ from .drawing import (
 )
 from .palette import INK, PAPER
 from .plan_map import SENSOR, MapContent, draw_map, draw_street_names, map_content
+from .viewpoint import MOST, TILE
 
-TILE = (640, 480)
-"""Width and height of a close-up, pixels."""
-MOST = 60
-"""Largest number of sensors on a sheet: readers refuse larger pictures."""
 DPI = 160
 SIZE = (TILE[0] / DPI, TILE[1] / DPI)  # of a close-up, inches
 REACH = 20.0  # metres from the sensor to the left and right border of its plan
-VIEW_REACH = 9.0  # metres around the sensor that its view shows
-SLOPES = np.array((0.52, 0.39))  # tangents of half the field of view
-ELEVATIONS = np.radians((24.0, 38.0, 55.0, 75.0))
-TURNS = np.radians((0.0, 30.0, -30.0, 60.0, -60.0, 100.0, -100.0, 150.0))
-"""Directions tried for the camera: height above the horizon, and from that of the road."""
-
-
-def viewpoints(site: Site, sensor: Sensor) -> list[Viewpoint]:
-    """Return camera positions for a close-up of a sensor, the best first: from over the road, rather low."""
-    nearest = site.targets.xyz[np.argmin(np.hypot(*(site.targets.xyz - sensor.xyz)[:, :2].T))]
-    away = nearest[:2] - sensor.foot[:2]
-    towards = float(np.arctan2(away[1], away[0]))
-    ring = np.linspace(0.0, 2.0 * np.pi, 12, endpoint=False)
-    ground = sensor.foot + VIEW_REACH * np.column_stack((np.cos(ring), np.sin(ring), np.zeros(12)))
-    points = np.vstack((ground, sensor.foot, sensor.xyz + np.array((0.0, 0.0, 1.0))))
-    return [frame(points, towards + turn, elevation, SLOPES) for elevation in ELEVATIONS for turn in TURNS]
 
 
 def draw_plans(geometry: SceneGeometry, site: Site, deployment: Deployment) -> list[Image.Image]:
@@ -174,46 +152,3 @@ def close_ups(sheet: bytes, count: int) -> list[tuple[bytes, ...]]:
                 picture.crop((left, top, left + TILE[0], top + TILE[1])).save(content, format="PNG")
             tiles.append(tuple(content.getvalue() for content in contents))
         return tiles
-
-
-@dataclass(frozen=True, eq=False)
-class Viewpoint:
-    """A perspective camera at a place (3,), metres.
-
-    The columns of ``axes`` (3, 3) are right, up and backwards, orthonormal; ``slopes`` (2,) are the tangents of half
-    the field of view, across and upwards.
-    """
-
-    place: Float
-    axes: Float
-    slopes: Float
-
-    def project(self, points: Float) -> Float:
-        """Return the positions of points (n, 3) on the picture, (n, 2) in shares of its size from the lower left."""
-        seen = (points - self.place) @ self.axes
-        return 0.5 + seen[:, :2] / (-2.0 * seen[:, 2:] * self.slopes)
-
-
-def frame(points: Float, azimuth: float, elevation: float, slopes: Float) -> Viewpoint:
-    r"""Return the nearest viewpoint in a direction that has all points in its picture.
-
-    With right, up and backwards coordinates :math:`r, u, b` of a point and :math:`c_r, c_u, c_b` of the camera, the
-    point is in the picture when :math:`|r - c_r| \le s_r (c_b - b)` and the same for :math:`u`. The largest :math:`r +
-    s_r b` and :math:`-r + s_r b` over all points therefore give :math:`c_r` and the least :math:`c_b` directly; the
-    larger of the two :math:`c_b` is taken.
-
-    Parameters
-    ----------
-    points : (n, 3) float64, metres
-    azimuth, elevation : float, radians
-        Direction from the points to the camera; azimuth counter-clockwise from +x.
-    """
-    level, rise = math.cos(elevation), math.sin(elevation)
-    back = np.array((level * math.cos(azimuth), level * math.sin(azimuth), rise))
-    right = np.array((-math.sin(azimuth), math.cos(azimuth), 0.0))
-    axes = np.column_stack((right, np.cross(back, right), back))
-    seen = points @ axes
-    high = (seen[:, :2] + slopes * seen[:, 2:]).max(axis=0)
-    low = (-seen[:, :2] + slopes * seen[:, 2:]).max(axis=0)
-    place = axes @ np.append((high - low) / 2.0, ((high + low) / (2.0 * slopes)).max())
-    return Viewpoint(place, axes, slopes)

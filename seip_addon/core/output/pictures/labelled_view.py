@@ -2,7 +2,6 @@
 
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -10,7 +9,6 @@ from matplotlib.image import imread
 from matplotlib.patches import Rectangle
 from PIL import Image
 
-from ...arrays import Boolean, Float
 from ...choosing.placement.deployment import Deployment
 from ...site.site import Site
 from ...storage.files import whole_file
@@ -29,6 +27,7 @@ from .drawing import (
     text_width,
 )
 from .palette import INK, PAPER
+from .viewpoint import Sight
 
 DPI = 160
 LEGEND_LINE, CREDIT_LINE, MARGIN = 0.3, 0.19, 0.2  # inches
@@ -36,18 +35,6 @@ LEGEND_GAP, SWATCH = 0.22, 0.3  # inches
 LEGEND_SIZE = 9.5  # points
 BACKGROUND_COLOUR = "#e9edf0"
 HIDDEN_NOTE = "outlined sensors stand behind something"
-
-
-@dataclass(frozen=True, eq=False)
-class Sight:
-    """Positions on a picture, as shares of its width and height from the lower left.
-
-    ``sensors`` (k, 2), of which those in ``hidden`` (k,) have something before them, and ``targets`` (t, 2).
-    """
-
-    sensors: Float
-    hidden: Boolean
-    targets: Float
 
 
 def save_labelled_view(  # noqa: PLR0913  # what is written on the picture

@@ -2,7 +2,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from seip_addon.core.output.pictures.close_ups import frame
+from seip_addon.core.output.pictures.viewpoint import frame
 
 SLOPES = np.array((0.3, 0.2))
 
