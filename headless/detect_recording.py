@@ -67,52 +67,8 @@ from seip_addon.scene.read import read_scene
 from seip_addon.scene.render import silenced
 from seip_addon.scene.sensors import read_sensors
 
-
-def save_video(path: Path, pictures: Sequence[Path], rate: float) -> None:
-    """Write pictures of one size as an MP4 video (H.264).
-
-    Parameters
-    ----------
-    rate : float, hertz
-        Pictures per second.
-    """
-    scene = bpy.data.scenes.new("video")
-    try:
-        with Image.open(pictures[0]) as first:
-            render = scene.render
-            render.resolution_x, render.resolution_y = first.size
-        render.resolution_percentage = 100
-        render.fps, render.fps_base = max(1, round(rate)), max(1, round(rate)) / rate
-        scene.view_settings.view_transform = "Standard"  # pictures keep their colours
-        sequencer = scene.sequence_editor_create()
-        strips = sequencer.strips if hasattr(sequencer, "strips") else sequencer.sequences
-        strip = strips.new_image("pictures", str(pictures[0]), channel=1, frame_start=1)
-        for picture in pictures[1:]:
-            strip.elements.append(picture.name)
-        scene.frame_start, scene.frame_end = 1, len(pictures)
-        if hasattr(render.image_settings, "media_type"):  # Blender 5
-            render.image_settings.media_type = "VIDEO"
-        render.image_settings.file_format = "FFMPEG"
-        render.ffmpeg.format, render.ffmpeg.codec = "MPEG4", "H264"
-        render.ffmpeg.constant_rate_factor = "HIGH"
-        render.use_file_extension = False
-        with whole_file(path) as temporary, silenced(), held_signals():
-            render.filepath = str(temporary)
-            bpy.ops.render.render(animation=True, scene=scene.name)
-    finally:
-        bpy.data.scenes.remove(scene)
-
-
 LEAST_CONFIDENCE = 0.5
 """Confidence from which detections in recordings are drawn and listed: those that are more likely true than false."""
-
-
-def area_of_recording(frames: RecordedFrames, detector: Detector, name: str) -> DetectionArea:
-    """Return the detection area of a recording: its region, with heights above the estimated ground."""
-    west, south, east, north = map(float, frames.region.bounds)
-    grid = grid_over((west, south, east, north), (BOTTOM, TOP), detector.settings.pillar)
-    return DetectionArea(grid, frames.ground, name)
-
 
 RADIUS = 80.0
 """Radius of the region around each sensor, metres: the detector was trained on regions of about this size."""
@@ -285,6 +241,13 @@ def _detected(
         results.append(result)
     yield Progress(total, total, "detecting")
     return results
+
+
+def area_of_recording(frames: RecordedFrames, detector: Detector, name: str) -> DetectionArea:
+    """Return the detection area of a recording: its region, with heights above the estimated ground."""
+    west, south, east, north = map(float, frames.region.bounds)
+    grid = grid_over((west, south, east, north), (BOTTOM, TOP), detector.settings.pillar)
+    return DetectionArea(grid, frames.ground, name)
 
 
 def _inside(found: Detections, frames: RecordedFrames) -> Detections:
@@ -477,6 +440,41 @@ def _save_table(
     with whole_file(path) as temporary:
         temporary.write_text(table.getvalue(), encoding="utf-8")
     return count
+
+
+def save_video(path: Path, pictures: Sequence[Path], rate: float) -> None:
+    """Write pictures of one size as an MP4 video (H.264).
+
+    Parameters
+    ----------
+    rate : float, hertz
+        Pictures per second.
+    """
+    scene = bpy.data.scenes.new("video")
+    try:
+        with Image.open(pictures[0]) as first:
+            render = scene.render
+            render.resolution_x, render.resolution_y = first.size
+        render.resolution_percentage = 100
+        render.fps, render.fps_base = max(1, round(rate)), max(1, round(rate)) / rate
+        scene.view_settings.view_transform = "Standard"  # pictures keep their colours
+        sequencer = scene.sequence_editor_create()
+        strips = sequencer.strips if hasattr(sequencer, "strips") else sequencer.sequences
+        strip = strips.new_image("pictures", str(pictures[0]), channel=1, frame_start=1)
+        for picture in pictures[1:]:
+            strip.elements.append(picture.name)
+        scene.frame_start, scene.frame_end = 1, len(pictures)
+        if hasattr(render.image_settings, "media_type"):  # Blender 5
+            render.image_settings.media_type = "VIDEO"
+        render.image_settings.file_format = "FFMPEG"
+        render.ffmpeg.format, render.ffmpeg.codec = "MPEG4", "H264"
+        render.ffmpeg.constant_rate_factor = "HIGH"
+        render.use_file_extension = False
+        with whole_file(path) as temporary, silenced(), held_signals():
+            render.filepath = str(temporary)
+            bpy.ops.render.render(animation=True, scene=scene.name)
+    finally:
+        bpy.data.scenes.remove(scene)
 
 
 def _rate(frames: RecordedFrames) -> float:

@@ -25,6 +25,19 @@ from .pillars import PillarGrid
 from .rotated_boxes import in_plan, paired_iou
 from .settings import CLASSES
 
+# Channels of a box, after those of the heat maps.
+OFFSET, SIZE, AXIS, HEADING, OVERLAP = slice(0, 3), slice(3, 6), slice(6, 8), slice(8, 10), 10
+BOX_CHANNELS = 11
+
+TYPICAL_SIZE = (4.5, 1.8, 1.6)
+"""Length, width and height in metres, to which sizes are predicted as log ratios."""
+
+HEAT_STD = 0.18  # standard deviation of heat along and across a box, as a share of its length and width
+MIN_HEAT = 0.2  # least heat of a cell that learns the box
+INITIAL_HEAT = 0.01  # predicted heat of every cell before training
+MAX_PEAKS = 500  # most peaks of a cloud that go into suppression, those of the highest heat
+OVERLAP_POWER = 0.5  # exponent p of the predicted overlap in the score heat^(1 − p) · overlap^p
+
 
 def heat_map_loss(logits: Tensor, heat: Tensor, counted: Tensor) -> Tensor:
     r"""Return the focal loss of a heat map whose peaks are 1, for each peak (Law and Deng 2018, α = 2, β = 4).
@@ -50,22 +63,6 @@ def heat_map_loss(logits: Tensor, heat: Tensor, counted: Tensor) -> Tensor:
 def weighted_mean(values: Tensor, weight: Tensor) -> Tensor:
     """Return Σ weight · value / Σ weight; zero where nothing weighs."""
     return (values * weight).sum() / weight.sum().clamp(min=1e-6)
-
-
-# Channels of a box, after those of the heat maps.
-OFFSET, SIZE, AXIS, HEADING, OVERLAP = slice(0, 3), slice(3, 6), slice(6, 8), slice(8, 10), 10
-BOX_CHANNELS = 11
-
-TYPICAL_SIZE = (
-    4.5,
-    1.8,
-    1.6,
-)  # length, width and height in metres; sizes are predicted as log ratios to these
-HEAT_STD = 0.18  # standard deviation of heat along and across a box, as a share of its length and width
-MIN_HEAT = 0.2  # least heat of a cell that learns the box
-INITIAL_HEAT = 0.01  # predicted heat of every cell before training
-MAX_PEAKS = 500  # most peaks of a cloud that go into suppression, those of the highest heat
-OVERLAP_POWER = 0.5  # exponent p of the predicted overlap in the score heat^(1 − p) · overlap^p
 
 
 @dataclass(frozen=True, eq=False)

@@ -90,12 +90,12 @@ def _labels(boxes: Iterable[_Box]) -> BoxLabels:
         rows.append([float(number) for number in row])
         categories.append(category)
     table = np.array(rows, dtype=np.float64).reshape(-1, 7)
-    middle, size, yaw = (
-        (table[:, :3], SENSOR_COORDINATE),
-        (table[:, 3:6], ROAD_USER_SIZE),
-        (table[:, 6], UNWRAPPED_ANGLE),
-    )
-    if fault := Limits.first_fault({"the middle of a box": middle, "its size": size, "its yaw": yaw}):
+    checks = {
+        "the middle of a box": (table[:, :3], SENSOR_COORDINATE),
+        "its size": (table[:, 3:6], ROAD_USER_SIZE),
+        "its yaw": (table[:, 6], UNWRAPPED_ANGLE),
+    }
+    if fault := Limits.first_fault(checks):
         raise ValueError(fault)
     table[:, 6] = np.mod(table[:, 6] + np.pi, 2 * np.pi) - np.pi
     return BoxLabels(table, np.array(categories, dtype=np.str_), dict(ignored))

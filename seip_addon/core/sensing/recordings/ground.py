@@ -13,11 +13,8 @@ from ...geometry.height_raster import HeightRaster
 _STEP = 1.0  # metres between heights
 _LOW_SHARE = 0.1  # quantile of the heights in a cell: below leaves and walls, above stray points
 _BLOCK = 8  # cells along a side of a block, in which the lowest cells are taken for ground first
-_PASSES = (
-    (8.0, 0.8),
-    (4.0, 0.4),
-    (2.0, 0.25),
-)  # metres: width of the smoothing, and height up to which cells are ground
+_PASSES = ((8.0, 0.8), (4.0, 0.4), (2.0, 0.25))
+"""Width of the smoothing in each pass, and height up to which cells are ground then, metres."""
 _DRAWS = 500  # planes tried
 _PLANE_MARGIN = 0.15  # metres from a plane within which a point supports it
 _MAX_TILT = math.radians(45)

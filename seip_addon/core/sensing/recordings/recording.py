@@ -110,9 +110,8 @@ def _sensor(name: str, paths: Sequence[Path], rate: float) -> SensorRecording:
             raise SeipError(f"{listed} has {len(times):,} times for {len(paths):,} sweeps: give one for each")
         TIME.require(times, listed, "time of a sweep")
     elif (named := _times_of_names(paths)) is not None:
-        order = np.argsort(
-            named, kind="stable"
-        )  # by time: as numbers, decimals without trailing zeros are out of order
+        # by time: as numbers, decimals without trailing zeros are out of order
+        order = np.argsort(named, kind="stable")
         times, paths = named[order], [paths[number] for number in order]
     else:
         times = np.arange(len(paths)) / rate
