@@ -27,6 +27,9 @@ Number = TypeVar("Number", int, float)
 _NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
 NUMBER = "number"
 """Name of the types of options that take a number within limits."""
+_ANY = Limits(-1e15, 1e15)
+"""Of options whose own limits are checked where their numbers are used."""
+_MAX_PATH, _MAX_NAME = 4096, 255  # bytes, as Linux has them; others are within these
 
 
 class _BriefHelp(argparse.HelpFormatter):
@@ -163,11 +166,6 @@ def _within(limits: Limits, text: str, value: Number) -> Number:
     if not limits.allow(value):
         raise argparse.ArgumentTypeError(f"must be {limits.broken_by(value)}, not {text[:40]}")
     return value
-
-
-_ANY = Limits(-1e15, 1e15)
-"""Of options whose own limits are checked where their numbers are used."""
-_MAX_PATH, _MAX_NAME = 4096, 255  # bytes, as Linux has them; others are within these
 
 
 def add_settings(group: argparse._ActionsContainer, kind: type, *names: str) -> None:

@@ -15,6 +15,10 @@ from seip_addon.core.estimates import Interval, student_quantile
 from .frame_results import FrameResult
 from .matching import Match, Rule, match
 
+MIN_TEST_RUNS = 4  # runs below which there is no interval: of three it would leave nearly everything open
+ADVISED_TEST_RUNS = 8
+MISSED_SCORE = -np.inf  # the score at which a road user is found that none finds
+
 
 def jackknife_reach(left_out: Float) -> float:
     """Return half the width of the 95 % jackknife interval of a figure.
@@ -60,12 +64,7 @@ def share_interval(share: float, left_out: Float, count: float) -> Interval:
     return min(low, share), max(high, share)
 
 
-MIN_TEST_RUNS = 4  # runs below which there is no interval: of three it would leave nearly everything open
-ADVISED_TEST_RUNS = 8
-
 Table = TypeVar("Table", "EvaluatedDetections", "CountedTruth")
-
-MISSED_SCORE = -np.inf  # the score at which a road user is found that none finds
 
 
 @dataclass(frozen=True, eq=False)

@@ -33,6 +33,8 @@ SHIPPED_DETECTOR = Path(__file__).with_name("shipped_detector.pt")
 
 _MAX_BYTES = 1 << 32  # bytes of a file: 4 GiB
 _SEED_LOCK = threading.Lock()  # all threads share the generator of random numbers from which torch draws weights
+_READ_ERRORS = (*READ_ERRORS, AssertionError, ImportError, pickle.UnpicklingError, struct.error)
+"""Errors that torch raises on reading files that it has not written, or that lack expected values."""
 
 
 @dataclass(frozen=True)
@@ -232,10 +234,6 @@ def reading_detector(path: str | os.PathLike[str]) -> Iterator[None]:
 
 class _ContentError(SeipError):
     """Fault in the content of a file; the message is part of a sentence."""
-
-
-_READ_ERRORS = (*READ_ERRORS, AssertionError, ImportError, pickle.UnpicklingError, struct.error)
-"""Errors that torch raises on reading files that it has not written, or that lack expected values."""
 
 
 def _check_archive(content: bytes) -> None:

@@ -22,6 +22,8 @@ from .recordings import MountedSensors, SampledRun, Simulator
 from .rules import MAIN_RULE, precisions
 from .training import deterministic
 
+AT_ONCE = (os.cpu_count() or 1) + 1  # works in threads on the CPU: one more than cores, as each also waits
+
 
 def side_by_side(
     works: Sequence[Generator[Progress, None, Result]], threads: int
@@ -81,9 +83,6 @@ def _sum_of(parts: Sequence[Progress], works: int) -> Progress:
     done, total = sum(part.done for part in parts), sum(part.total for part in parts)
     counted = all(part.counted and part.total for part in parts)
     return Progress(done, total * works // len(parts), parts[-1].what, counted)
-
-
-AT_ONCE = (os.cpu_count() or 1) + 1  # works in threads on the CPU: one more than cores, as each also waits
 
 
 def detect_in_runs(  # what measures where, what looks at it, and how

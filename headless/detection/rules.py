@@ -14,6 +14,8 @@ from .settings import CLASS_CATEGORIES
 
 SMALL_OVERLAP = 0.5  # at which classes of small road users are evaluated, as KITTI does
 SMALL_CLASSES = ("cycle", "pedestrian")
+CLASSES = {"vehicles": "bev_0.7", "two-wheelers": "motorcycle_bicycle_0.5", "pedestrians": "pedestrian_0.5"}
+"""Rule for each class of road users by which placements are compared; the first is the study's own."""
 
 
 def _of_class(name: str) -> tuple[str, Rule]:
@@ -34,9 +36,6 @@ RULES = {
 """How average precision is taken; the first is the study's own."""
 
 MAIN_RULE = next(iter(RULES.values()))
-
-CLASSES = {"vehicles": "bev_0.7", "two-wheelers": "motorcycle_bicycle_0.5", "pedestrians": "pedestrian_0.5"}
-"""Rule for each class of road users by which placements are compared; the first is the study's own."""
 
 
 def precision_by(frames: Sequence[FrameResult], rule: Rule) -> Precision:

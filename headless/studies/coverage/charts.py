@@ -23,6 +23,7 @@ from .cells import CENTRAL_WEIGHTS, COUNTS, CoverageStudy
 
 PANEL_HEIGHT, PANEL_WIDTH, MIN_PANELS = 4.2, 3.65, 3  # inches, inches, least width of a chart in panels
 TYPE_SHIFT = 0.09  # of the step between two heights, from one type to the next
+NO_SPAN = (math.nan, math.nan)
 
 
 def save_height_chart(path: str | os.PathLike[str], study: CoverageStudy, title: str) -> None:
@@ -68,9 +69,6 @@ def save_weight_chart(path: str | os.PathLike[str], study: CoverageStudy, title:
         panel.set_xticks(range(len(weights)), ["1\n(vanilla)", *(f"{weight:g}" for weight in CENTRAL_WEIGHTS)])
         _style_shares(panel, "weight of the centre")
     _save(path, figure, panels, f"{title}: vanilla against weighted placement")
-
-
-NO_SPAN = (math.nan, math.nan)
 
 
 def _figure(count: int) -> tuple[Figure, Sequence[Axes]]:

@@ -6,6 +6,43 @@ Its plots are pictures without values.
 
 from dataclasses import dataclass
 
+PUBLISHED_GAINS = {"type1": ("about 20 %", "7 %"), "type2": ("10 %", "5 %")}
+"""Gains of average precision from one to two and from two to four sensors (V-C); the text gives none for type 3."""
+HEIGHTS = (3.5, 5.4, 8.0)  # metres, section V-A
+DIFFERENCES = (
+    ("Scene", "CARLA's Town05 with its buildings, trees and furniture, meshes of Unreal Engine", "{scene}"),
+    ("LiDAR", "CARLA's; its types 1 to 3", "the same types; drop-off as CARLA's, beams evenly spaced"),
+    (
+        "Seen",
+        "a return within δ of the target; δ, grid and spacing of candidates are not given",
+        "the same rule; {criterion}",
+    ),
+    (
+        "Weights",
+        "central box; its weight is not given",
+        "central box of the junction; weights 2, 4, 8 and 16 are tried",
+    ),
+    ("Solver", "Gurobi", "HiGHS or CBC, with a bound; the optimum is proven unless a row says otherwise"),
+    (
+        "Traffic",
+        "SUMO and CARLA together; length, runs and split into training and test are not given",
+        "{traffic}",
+    ),
+    ("Bodies", "CARLA's meshes of the models", "the models' sizes with this program's own bodies; no pedestrians"),
+    (
+        "Detector",
+        "PointPillars of MMDetection3D; settings and training are not given",
+        "PointPillars of this program, {training}",
+    ),
+    (
+        "Truth",
+        "which vehicles have to be found is not given",
+        "all vehicles with their middle in the region, visible or not; rolling shutter",
+    ),
+    ("AP", "IoU of 0.7 from above; “%” may be points or shares; no intervals", "the same; points; 95 % intervals"),
+)
+"""Differences: aspect, the paper's entry, and ours, with placeholders that a run of the command fills in."""
+
 
 @dataclass(frozen=True)
 class PublishedClaim:
@@ -42,43 +79,3 @@ PUBLISHED_CLAIMS = (
     ),
     PublishedClaim(10, "IV", "greedy placement reaches 1 − 1/e of the optimum (cited)"),
 )
-
-
-PUBLISHED_GAINS = {"type1": ("about 20 %", "7 %"), "type2": ("10 %", "5 %")}
-"""Gains of average precision from one to two and from two to four sensors (V-C); the text gives none for type 3."""
-
-HEIGHTS = (3.5, 5.4, 8.0)  # metres, section V-A
-
-DIFFERENCES = (
-    ("Scene", "CARLA's Town05 with its buildings, trees and furniture, meshes of Unreal Engine", "{scene}"),
-    ("LiDAR", "CARLA's; its types 1 to 3", "the same types; drop-off as CARLA's, beams evenly spaced"),
-    (
-        "Seen",
-        "a return within δ of the target; δ, grid and spacing of candidates are not given",
-        "the same rule; {criterion}",
-    ),
-    (
-        "Weights",
-        "central box; its weight is not given",
-        "central box of the junction; weights 2, 4, 8 and 16 are tried",
-    ),
-    ("Solver", "Gurobi", "HiGHS or CBC, with a bound; the optimum is proven unless a row says otherwise"),
-    (
-        "Traffic",
-        "SUMO and CARLA together; length, runs and split into training and test are not given",
-        "{traffic}",
-    ),
-    ("Bodies", "CARLA's meshes of the models", "the models' sizes with this program's own bodies; no pedestrians"),
-    (
-        "Detector",
-        "PointPillars of MMDetection3D; settings and training are not given",
-        "PointPillars of this program, {training}",
-    ),
-    (
-        "Truth",
-        "which vehicles have to be found is not given",
-        "all vehicles with their middle in the region, visible or not; rolling shutter",
-    ),
-    ("AP", "IoU of 0.7 from above; “%” may be points or shares; no intervals", "the same; points; 95 % intervals"),
-)
-"""Differences: aspect, the paper's entry, and ours, with placeholders that a run of the command fills in."""

@@ -18,6 +18,7 @@ IN_COMPANY = 0.4
 
 MOST_COMPANIONS = 3
 _BESIDE = (0.65, 0.9)  # metres between neighbours in a row, and between rows
+_STREAM = 0x67726F75  # keeps these draws apart from others of the same seed
 
 
 def with_companions(trajectories: Trajectories, seed: int) -> Generator[Progress, None, Trajectories]:
@@ -62,6 +63,3 @@ def with_companions(trajectories: Trajectories, seed: int) -> Generator[Progress
     kept = np.ones(len(grouped), dtype=np.bool_)
     kept[overlaps.pair[:, 1][overlaps.pair[:, 1] >= len(trajectories)]] = False
     return some_users(grouped, kept)
-
-
-_STREAM = 0x67726F75  # keeps these draws apart from others of the same seed

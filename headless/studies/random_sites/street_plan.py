@@ -35,6 +35,14 @@ KERB_LANE_SHARE = 0.6  # of arms
 SIDEWALK, CYCLE_LANE = 2.5, 1.5  # metres, as the builder lays them
 CLEARANCE = 0.6  # metres between pavements and the objects behind them
 BUILT_REACH = 125.0  # largest distance of objects along a street from the middle, metres
+_NAMES = ("Alder", "Birch", "Cedar", "Elm", "Hazel")
+_SAME_LANES = 0.8  # share of arms with equal numbers of lanes out and in
+_BETWEEN = 1.0  # metres between a building and a wall
+_ROOM = {"tree": 1.6, "street_lamp": 0.3, "bus_stop": 4.0}  # metres to the next building or wall
+_CITY_SHARE, _VACANT_SHARE = 0.55, 0.15
+_WALLED_SHARE, _SHORTEST_WALL = 0.45, 4.0
+_GREEN_SHARE, _TREE_SHARE = 0.5, 0.85
+_SHELTER_SHARE = 0.2
 
 
 @dataclass(frozen=True, eq=False)
@@ -187,10 +195,6 @@ def _draw_arms(random: Random) -> tuple[Arm, ...]:
     return tuple(arms)
 
 
-_NAMES = ("Alder", "Birch", "Cedar", "Elm", "Hazel")
-_SAME_LANES = 0.8  # share of arms with equal numbers of lanes out and in
-
-
 def _draw_lanes(random: Random) -> int:
     return int(random.choice(list(LANES), p=list(LANES.values())))
 
@@ -224,10 +228,6 @@ def _draw_things(plan: StreetPlan, random: Random) -> Iterator[Thing]:
         room = _ROOM[one.tags.get("natural", one.tags.get("highway", ""))]
         if spot.distance(taken) > room and spot.distance(lines) > room and spot.distance(streets) > 0.0:
             yield one
-
-
-_BETWEEN = 1.0  # metres between a building and a wall
-_ROOM = {"tree": 1.6, "street_lamp": 0.3, "bus_stop": 4.0}  # metres to the next building or wall
 
 
 def _frames(arm: Arm, first: float, spacing: float) -> Iterator[tuple[float, Float, Float]]:
@@ -272,9 +272,6 @@ def _draw_buildings(plan: StreetPlan, streets: BaseGeometry, random: Random) -> 
             along += width + (float(random.choice([0.3, 6.0], p=[0.8, 0.2])) if is_city else random.uniform(3.0, 10.0))
 
 
-_CITY_SHARE, _VACANT_SHARE = 0.55, 0.15
-
-
 def _lot(line: shapely.LineString, along: float, width: float, front: float, depth: float) -> shapely.Polygon:
     """Return a rectangle with its front along a street, ``front`` metres to the left."""
     begin, end = (shapely.get_coordinates(line.interpolate(place))[0] for place in (along, along + width))
@@ -305,9 +302,6 @@ def _draw_walls(plan: StreetPlan, taken: BaseGeometry, random: Random) -> Iterat
                 yield Thing(shapely.get_coordinates(part), _wall_tags(random))
 
 
-_WALLED_SHARE, _SHORTEST_WALL = 0.45, 4.0
-
-
 def _wall_tags(random: Random) -> dict[str, str]:
     kind = str(random.choice(["wall", "hedge", "fence"]))
     return {"barrier": kind, "height": f"{random.uniform(0.8, 2.2):.1f}"}
@@ -328,9 +322,6 @@ def _draw_trees(plan: StreetPlan, random: Random) -> Iterator[Thing]:
                 yield Thing(_beside(place, ahead, side * aside)[None], tags)
 
 
-_GREEN_SHARE, _TREE_SHARE = 0.5, 0.85
-
-
 def _draw_lamps(plan: StreetPlan, random: Random) -> Iterator[Thing]:
     """Yield street lamps at the outer edge of the pavements, on alternating sides."""
     height = f"{random.uniform(5.5, 9.0):.1f}"
@@ -349,6 +340,3 @@ def _draw_shelters(plan: StreetPlan, random: Random) -> Iterator[Thing]:
             _, place, ahead = next(_frames(arm, float(random.uniform(35.0, 75.0)), 10.0))
             spot = _beside(place, ahead, side * (arm.half_width + 0.3))
             yield Thing(spot[None], {"highway": "bus_stop", "shelter": "yes"})
-
-
-_SHELTER_SHARE = 0.2

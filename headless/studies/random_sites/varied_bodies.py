@@ -12,6 +12,12 @@ from seip_addon.core.sensing.traffic.trajectories import CATEGORIES, RoadUser, T
 CORRELATION = 0.5  # correlation of any two dimensions of one kind of road user
 REACH = 2.0  # largest distance of a drawn dimension from the mean, in standard deviations
 _HALVINGS = 3  # number of times that a growth which causes an overlap is halved before it is dropped
+SHAPES: Mapping[str, tuple[float, float, float, float]] = dict.fromkeys(CATEGORIES, (0.10, 0.06, 0.10, 0.06)) | {
+    "car": (0.24, 0.10, 0.14, 0.08),
+    "van": (0.20, 0.10, 0.12, 0.08),
+}
+"""Largest absolute value of each number of a shape; it moves the foot of a car's windscreen by up to 0.2 m."""
+_STREAM = 0x626F6479  # keeps these draws apart from others of the same seed
 
 
 @dataclass(frozen=True)
@@ -75,12 +81,6 @@ KINDS: Mapping[str, Mapping[str, BodyKind]] = {
 Articulated vehicles are left out: their bodies bend, and those here do not.
 """
 
-SHAPES: Mapping[str, tuple[float, float, float, float]] = dict.fromkeys(CATEGORIES, (0.10, 0.06, 0.10, 0.06)) | {
-    "car": (0.24, 0.10, 0.14, 0.08),
-    "van": (0.20, 0.10, 0.12, 0.08),
-}
-"""Largest absolute value of each number of a shape; it moves the foot of a car's windscreen by up to 0.2 m."""
-
 
 def shaped(trajectories: Trajectories, seed: int) -> Trajectories:
     """Give each road user a shape of its own, without changing its size."""
@@ -140,6 +140,3 @@ def draw_shape(category: str, random: np.random.Generator) -> tuple[float, float
 def _with_size(user: RoadUser, size: list[float]) -> RoadUser:
     length, width, height = size
     return replace(user, length=length, width=width, height=height)
-
-
-_STREAM = 0x626F6479  # keeps these draws apart from others of the same seed

@@ -41,6 +41,12 @@ MAX_TILT = 90.0
 
 MAX_YAWS = 360
 """Yaws over the circle; larger numbers are rejected as typing errors."""
+_MIN_STEP = 0.01
+"""Least step of a range, metres or degrees; finer ranges are rejected as typing errors."""
+_HEIGHTS = (
+    f"a height in metres nor a range FROM:TO:STEP up to {MAX_SENSOR_HEIGHT:g} m in steps of at least {_MIN_STEP:g} m"
+)
+_TILTS = f"a tilt in degrees nor a range FROM:TO:STEP within ±{MAX_TILT:g}° in steps of at least {_MIN_STEP:g}°"
 
 
 @dataclass(frozen=True)
@@ -148,14 +154,6 @@ def tilts_of(texts: Sequence[str]) -> tuple[float, ...]:
         One is neither.
     """
     return tuple(math.radians(tilt) + 0.0 for tilt in _numbers(texts, -MAX_TILT, MAX_TILT, _TILTS))
-
-
-_MIN_STEP = 0.01
-"""Least step of a range, metres or degrees; finer ranges are rejected as typing errors."""
-_HEIGHTS = (
-    f"a height in metres nor a range FROM:TO:STEP up to {MAX_SENSOR_HEIGHT:g} m in steps of at least {_MIN_STEP:g} m"
-)
-_TILTS = f"a tilt in degrees nor a range FROM:TO:STEP within ±{MAX_TILT:g}° in steps of at least {_MIN_STEP:g}°"
 
 
 def _numbers(texts: Sequence[str], above: float, most: float, what: str) -> list[float]:

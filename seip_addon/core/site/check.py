@@ -48,6 +48,18 @@ MAX_NAMED = 5
 """Number of objects with the same problem that are named individually."""
 
 Severity = Literal["ERROR", "WARNING"]
+ROLES = {
+    "region": "Region",
+    "roads": "Roads",
+    "ground": "Ground",
+    "occluders": "Occluders",
+    "candidate_areas": "Candidate areas",
+    "weighted_regions": "Weighted regions",
+    "forbidden_areas": "Forbidden areas",
+    "mandatory_areas": "Mandatory areas",
+}
+"""Roles of surfaces, with their titles."""
+STAGES = 6
 
 
 @dataclass(frozen=True)
@@ -86,19 +98,6 @@ class Surface:
     role: str
     name: str
     triangles: Float
-
-
-ROLES = {
-    "region": "Region",
-    "roads": "Roads",
-    "ground": "Ground",
-    "occluders": "Occluders",
-    "candidate_areas": "Candidate areas",
-    "weighted_regions": "Weighted regions",
-    "forbidden_areas": "Forbidden areas",
-    "mandatory_areas": "Mandatory areas",
-}
-"""Roles of surfaces, with their titles."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -179,9 +178,6 @@ def check_site(
     yield Progress(STAGES, STAGES, "candidates", counted=False)
     of_user = (one for one in problems if one.severity == "ERROR" or one.obj not in contents.built)
     return SiteCheck(counts, _in_order(of_user))
-
-
-STAGES = 6
 
 
 def _in_order(problems: Iterable[Problem]) -> tuple[Problem, ...]:

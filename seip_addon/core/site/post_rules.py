@@ -19,6 +19,8 @@ AllowedName = Literal["cycle-tracks", "driveways", "landings", "private", "islan
 
 MIN_ISLAND_WIDTH = 4.0
 """Metres: islands and medians narrower than this are reserved for pedestrians, signals and signs."""
+ASSUMED_POLES: AllowedName = "assumed-poles"
+"""Name that lets assumed poles carry sensors: those of traffic lights for which the map has no post."""
 
 
 @dataclass(frozen=True)
@@ -50,8 +52,6 @@ RULES: dict[RuleName, Rule] = {
 }
 """Rules in order of application: a position is counted for the first rule that excludes it."""
 
-ASSUMED_POLES: AllowedName = "assumed-poles"
-"""Name that lets assumed poles carry sensors: those of traffic lights for which the map has no post."""
 
 ALLOWED: tuple[AllowedName, ...] = (*RULES, ASSUMED_POLES)
 """Names that a survey may allow."""

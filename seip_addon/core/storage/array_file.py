@@ -21,6 +21,12 @@ from numpy.typing import NDArray
 from ..errors import SeipError
 from .files import whole_file
 
+READ_ERRORS = (
+    *(OSError, EOFError, ArithmeticError, AttributeError, ValueError, LookupError, TypeError, RuntimeError),
+    *(MemoryError, zipfile.BadZipFile, zlib.error),
+)
+"""Exceptions raised by reading a damaged file, or by using its contents."""
+
 
 @dataclass(frozen=True)
 class ArrayFile:
@@ -139,10 +145,3 @@ def _claimed_bytes(file: io.BufferedReader) -> int:
                     raise ValueError(f"{info.filename} claims {size:,} bytes, which differs from its size in the file")
                 total += size
     return total
-
-
-READ_ERRORS = (
-    *(OSError, EOFError, ArithmeticError, AttributeError, ValueError, LookupError, TypeError, RuntimeError),
-    *(MemoryError, zipfile.BadZipFile, zlib.error),
-)
-"""Exceptions raised by reading a damaged file, or by using its contents."""

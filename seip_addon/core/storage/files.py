@@ -23,6 +23,12 @@ from ..errors import SeipError
 
 _UMASK = os.umask(0)  # read once at import, because reading changes it for all threads
 os.umask(_UMASK)
+_PREFIX = ".seip-"  # start of the names of unfinished files, followed by the id of the process that writes them
+_MARK = secrets.token_hex(4)  # mark of this process: in a container an earlier one may have had the same id
+_STALE_SECONDS = 86400.0  # age of abandoned unfinished files on systems where processes cannot be queried
+_LOCK_NAME = ".seip-lock"  # lock file in a folder, on systems that cannot open folders as files
+_LOCK_ERRORS = {errno.EWOULDBLOCK, errno.EACCES, errno.EDEADLK}
+_SPACE_ERRORS = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}
 
 
 @contextmanager
@@ -320,13 +326,6 @@ def digest(*parts: NDArray[Any] | str | bytes | float | None) -> str:
     return state.hexdigest()
 
 
-_PREFIX = ".seip-"  # start of the names of unfinished files, followed by the id of the process that writes them
-_MARK = secrets.token_hex(4)  # mark of this process: in a container an earlier one may have had the same id
-_STALE_SECONDS = 86400.0  # age of abandoned unfinished files on systems where processes cannot be queried
-
-_LOCK_NAME = ".seip-lock"  # lock file in a folder, on systems that cannot open folders as files
-_LOCK_ERRORS = {errno.EWOULDBLOCK, errno.EACCES, errno.EDEADLK}
-
 if sys.platform == "win32":
     import msvcrt
 
@@ -368,9 +367,6 @@ def _is_nobodys(entry: os.DirEntry[str], process: int) -> bool:
     except PermissionError:  # somebody else's, alive
         return False
     return False
-
-
-_SPACE_ERRORS = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}
 
 
 @contextmanager

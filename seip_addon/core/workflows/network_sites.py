@@ -33,6 +33,15 @@ from ..world.streetscape.parts import Part
 
 XML_CONTROL = {number: None for number in range(32) if number not in (9, 10, 13)}
 """Control characters, which XML cannot hold."""
+MOST_SITES = 20_000
+APPROACHES = 40.0
+"""Default length of the approaches in a site of a network, metres: half of that of a single site."""
+NEIGHBOUR_REACH = 4.0
+"""Sites within this multiple of the approaches are neighbours, between which the road is divided."""
+_MOST_BYTES = 1 << 28
+_COLUMNS = ("source", "latitude", "longitude")
+_NUMBER_COLUMNS: Mapping[str, Limits] = {"latitude": LATITUDE, "longitude": LONGITUDE, "weight": WEIGHT}
+_FOREIGN = str.maketrans({"ß": "ss", "ø": "o", "æ": "ae", "œ": "oe", "ł": "l", "đ": "d"})
 
 
 def extract_xml(extract: Extract) -> bytes:
@@ -71,17 +80,6 @@ def _credit(attribution: str) -> dict[str, str]:
 
 def _text(text: str) -> str:
     return text.translate(XML_CONTROL)
-
-
-MOST_SITES = 20_000
-APPROACHES = 40.0
-"""Default length of the approaches in a site of a network, metres: half of that of a single site."""
-NEIGHBOUR_REACH = 4.0
-"""Sites within this multiple of the approaches are neighbours, between which the road is divided."""
-_MOST_BYTES = 1 << 28
-_COLUMNS = ("source", "latitude", "longitude")
-_NUMBER_COLUMNS: Mapping[str, Limits] = {"latitude": LATITUDE, "longitude": LONGITUDE, "weight": WEIGHT}
-_FOREIGN = str.maketrans({"ß": "ss", "ø": "o", "æ": "ae", "œ": "oe", "ł": "l", "đ": "d"})
 
 
 @dataclass(frozen=True)

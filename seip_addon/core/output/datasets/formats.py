@@ -32,6 +32,53 @@ Files = dict[str, Callable[[], bytes]]
 """What gives the bytes of each file, by its path in the folder of a dataset."""
 Splits = Mapping[str, Sequence[str]]
 """Names of the samples of each split."""
+CLASSES = {
+    "car": "Car",
+    "van": "Van",
+    "truck": "Truck",
+    "bus": "Bus",
+    "motorcycle": "Motorcycle",
+    "bicycle": "Cyclist",
+    "pedestrian": "Pedestrian",
+}
+"""Names of the categories where a format leaves the choice to its user: KITTI's, as far as they go."""
+KITTI_CLASS = {
+    "Car": "Car",
+    "Van": "Van",
+    "Truck": "Truck",
+    "Bus": "Truck",
+    "Motorcycle": "Cyclist",
+    "Cyclist": "Cyclist",
+    "Pedestrian": "Pedestrian",
+    "DontCare": "DontCare",
+}
+"""As which of KITTI's classes each is evaluated, which is all that OpenPCDet evaluates a custom dataset by."""
+NO_OPENPCDET_LABEL = "0.0 0.0 0.0 1.0 1.0 1.0 0.0 DontCare\n"  # the label of a frame without any
+PLAN_STEP = 6.4  # what the range is a multiple of in plan, metres: 16 pillars of 0.4, 32 of 0.2 or 64 of 0.1 m
+HEIGHT_STEP = 2.0  # what the range is a multiple of in height, metres: 40 voxels of 0.05 m, as networks ask for
+MARGIN = 0.5  # between the boxes and the range, metres
+PILLAR_SIZE = 0.2
+LABELS = {name: number for number, name in enumerate(CLASSES.values())}
+PICKLE_PROTOCOL = 4  # whichever Python writes it, the bytes are the same
+KITTI_CLASSES = {category: KITTI_CLASS[name] for category, name in CLASSES.items()}
+"""KITTI has neither buses nor motorcycles; readers ignore or refuse a name that it does not have."""
+NO_KITTI_LABEL = "DontCare -1 -1 -10 0 0 0 0 -1 -1 -1 -1000 -1000 -1000 -10\n"  # the label of a frame without any
+PIXELS = 100  # width and height of the empty picture and of each box in it
+_IDENTITY = "1 0 0 0 0 1 0 0 0 0 1 0"
+CALIBRATION = "".join(
+    f"{name}: {numbers}\n"
+    for name, numbers in {
+        **dict.fromkeys(("P0", "P1", "P2", "P3"), _IDENTITY),
+        "R0_rect": "1 0 0 0 1 0 0 0 1",
+        "Tr_velo_to_cam": "0 -1 0 0 0 0 -1 0 1 0 0 0",
+        "Tr_imu_to_velo": _IDENTITY,
+    }.items()
+)
+FULLY_VISIBLE, PARTLY_VISIBLE = 0.8, 0.4
+"""Visibility from which an object counts as fully visible (0) and as partly occluded (1) and not largely (2)."""
+MERGED = "merged"
+IDENTITY = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)  # viewpoint in the origin
+POINT_TYPE = np.dtype([("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("intensity", "<f4")])
 
 
 @dataclass(frozen=True)
@@ -60,18 +107,6 @@ class Format:
     notes: Callable[[TrafficRun], tuple[str, ...]] = lambda _run: ()
 
 
-CLASSES = {
-    "car": "Car",
-    "van": "Van",
-    "truck": "Truck",
-    "bus": "Bus",
-    "motorcycle": "Motorcycle",
-    "bicycle": "Cyclist",
-    "pedestrian": "Pedestrian",
-}
-"""Names of the categories where a format leaves the choice to its user: KITTI's, as far as they go."""
-
-
 def label_lines(sample: Sample, xyz: Float) -> str:
     """Return a line ``x y z dx dy dz heading class`` for each box, from which the same float64 are read back.
 
@@ -96,26 +131,6 @@ def image_sets(splits: Splits) -> dict[str, bytes]:
     return {
         f"ImageSets/{split}.txt": "".join(f"{name}\n" for name in names).encode() for split, names in splits.items()
     }
-
-
-KITTI_CLASS = {
-    "Car": "Car",
-    "Van": "Van",
-    "Truck": "Truck",
-    "Bus": "Truck",
-    "Motorcycle": "Cyclist",
-    "Cyclist": "Cyclist",
-    "Pedestrian": "Pedestrian",
-    "DontCare": "DontCare",
-}
-"""As which of KITTI's classes each is evaluated, which is all that OpenPCDet evaluates a custom dataset by."""
-
-NO_OPENPCDET_LABEL = "0.0 0.0 0.0 1.0 1.0 1.0 0.0 DontCare\n"  # the label of a frame without any
-PLAN_STEP = 6.4  # what the range is a multiple of in plan, metres: 16 pillars of 0.4, 32 of 0.2 or 64 of 0.1 m
-HEIGHT_STEP = 2.0  # what the range is a multiple of in height, metres: 40 voxels of 0.05 m, as networks ask for
-MARGIN = 0.5  # between the boxes and the range, metres
-
-PILLAR_SIZE = 0.2
 
 
 def _openpcdet_files(sample: Sample) -> Files:
@@ -197,10 +212,6 @@ def _configuration(boxes: Float) -> str:
     return head + "".join(f"{key}: {json.dumps(value)}\n" for key, value in values.items())
 
 
-LABELS = {name: number for number, name in enumerate(CLASSES.values())}
-PICKLE_PROTOCOL = 4  # whichever Python writes it, the bytes are the same
-
-
 def _mmdetection3d_files(sample: Sample) -> Files:
     """Return ``points`` (float32) and ``labels`` of a sample, as version 1.1 of mmdetection3d has them.
 
@@ -235,27 +246,6 @@ def _information(folder: Path, names: Sequence[str]) -> bytes:
         )
     about = {"categories": LABELS, "dataset": "custom", "info_version": "1.1"}
     return pickle.dumps({"metainfo": about, "data_list": samples}, protocol=PICKLE_PROTOCOL)
-
-
-KITTI_CLASSES = {category: KITTI_CLASS[name] for category, name in CLASSES.items()}
-"""KITTI has neither buses nor motorcycles; readers ignore or refuse a name that it does not have."""
-
-NO_KITTI_LABEL = "DontCare -1 -1 -10 0 0 0 0 -1 -1 -1 -1000 -1000 -1000 -10\n"  # the label of a frame without any
-PIXELS = 100  # width and height of the empty picture and of each box in it
-
-_IDENTITY = "1 0 0 0 0 1 0 0 0 0 1 0"
-CALIBRATION = "".join(
-    f"{name}: {numbers}\n"
-    for name, numbers in {
-        **dict.fromkeys(("P0", "P1", "P2", "P3"), _IDENTITY),
-        "R0_rect": "1 0 0 0 1 0 0 0 1",
-        "Tr_velo_to_cam": "0 -1 0 0 0 0 -1 0 1 0 0 0",
-        "Tr_imu_to_velo": _IDENTITY,
-    }.items()
-)
-
-FULLY_VISIBLE, PARTLY_VISIBLE = 0.8, 0.4
-"""Visibility from which an object counts as fully visible (0) and as partly occluded (1) and not largely (2)."""
 
 
 def _kitti_files(sample: Sample) -> Files:
@@ -315,11 +305,6 @@ def _empty_picture() -> bytes:
     buffer = io.BytesIO()
     Image.new("RGB", (PIXELS, PIXELS)).save(buffer, "PNG")
     return buffer.getvalue()
-
-
-MERGED = "merged"
-IDENTITY = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)  # viewpoint in the origin
-POINT_TYPE = np.dtype([("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("intensity", "<f4")])
 
 
 def _pcd_files(sample: Sample) -> Files:

@@ -37,6 +37,20 @@ MOST_CORNERS = 40_000  # of all streets, some 300 kB
 FINEST = 2000  # parts of the window's width that streets are simplified to
 LARGEST_RADIUS, SMALLEST_RADIUS, BARE_RADIUS = 18.0, 3.5, 4.5
 """Pixels of circles: for the most money, at least, and of sites without sensor."""
+DPI = 150
+MAP_SIZE, LEGEND_HEIGHT, CURVE_SIZE = (7.2, 3.9), 0.55, (7.2, 3.1)  # inches
+MAP_SHAPE = (MAP_SIZE[1] - LEGEND_HEIGHT) / MAP_SIZE[0]
+PIXEL = 0.45  # points for each pixel of `NetworkView.radii`
+STREET_WIDTHS = (0.4, 0.7, 1.2)  # points, by importance
+MOST_NUMBERED, MOST_MARKED = 12, 40  # sites with their rank on the map; points of a curve that are marked
+STATUS_MARKS: dict[str, Style] = {
+    "without sensor": {"marker": "o", "markersize": 2 * BARE_RADIUS * PIXEL, "mfc": PAPER, "mec": SOFT_INK, "mew": 1.0},
+    "failed": {"marker": "x", "markersize": 6.5, "mec": SOFT_INK, "mew": 1.4},
+}
+CRITERIA = {
+    "road": "road seen, mean of the sites",
+    "returns": "typical returns from a road user",
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,22 +131,6 @@ def _drawn(streets: Sequence[Street], middle: Float, window: Window) -> Iterator
             break
         tolerance *= 1.5
     yield from simple
-
-
-DPI = 150
-MAP_SIZE, LEGEND_HEIGHT, CURVE_SIZE = (7.2, 3.9), 0.55, (7.2, 3.1)  # inches
-MAP_SHAPE = (MAP_SIZE[1] - LEGEND_HEIGHT) / MAP_SIZE[0]
-PIXEL = 0.45  # points for each pixel of `NetworkView.radii`
-STREET_WIDTHS = (0.4, 0.7, 1.2)  # points, by importance
-MOST_NUMBERED, MOST_MARKED = 12, 40  # sites with their rank on the map; points of a curve that are marked
-STATUS_MARKS: dict[str, Style] = {
-    "without sensor": {"marker": "o", "markersize": 2 * BARE_RADIUS * PIXEL, "mfc": PAPER, "mec": SOFT_INK, "mew": 1.0},
-    "failed": {"marker": "x", "markersize": 6.5, "mec": SOFT_INK, "mew": 1.4},
-}
-CRITERIA = {
-    "road": "road seen, mean of the sites",
-    "returns": "typical returns from a road user",
-}
 
 
 def draw_map(record: NetworkRecord, view: NetworkView) -> bytes:

@@ -18,6 +18,9 @@ SCHEMA = "seip-network/2"
 
 PROVEN = 1e-9
 """Gap up to which a network is proven optimal: smaller differences are rounding, as in `problem.TIE_TOLERANCE`."""
+COVERAGE_STEPS, RETURNS_STEPS = (0.2, 0.4, 0.6, 0.8), (1.0, 5.0, 20.0, 100.0)
+"""Coverages, and typical returns, at which a site gets the next of `SHARE_COLOURS`."""
+_ORDER = ("equipped", "without sensor", "failed")
 
 
 @dataclass(frozen=True)
@@ -168,11 +171,6 @@ def network_gap(criterion: Literal["road", "returns"], value: float, bound: floa
 def network_json(record: NetworkRecord) -> dict[str, Any]:
     """Return a record as a JSON value with its schema."""
     return {"schema": SCHEMA, **as_json(record)}
-
-
-COVERAGE_STEPS, RETURNS_STEPS = (0.2, 0.4, 0.6, 0.8), (1.0, 5.0, 20.0, 100.0)
-"""Coverages, and typical returns, at which a site gets the next of `SHARE_COLOURS`."""
-_ORDER = ("equipped", "without sensor", "failed")
 
 
 @dataclass(frozen=True)

@@ -35,6 +35,12 @@ from .palette import (
 
 Numbers = NDArray[np.floating[Any]]
 Aspect = Literal["returns", "seen", "times", "weights"]
+RETURNS_CLASSES = (1.0, FEW_RETURNS, 20.0)
+"""Returns from a pedestrian at which the classes of a plan change."""
+GOLDEN_RATIO = 0.618033988749895  # of the colour circle, from a road user to the next: neighbours differ most
+NEITHER, BOTH, PRESENT_ONLY, KEPT_ONLY = range(4)
+"""Classes of targets by which of the two placements see them."""
+CLASS_WORDS = ("seen by neither", "seen by both", "seen only by the present", "seen only by the kept")
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,10 +67,6 @@ class Colouring:
         """Share of the targets in each class, 0 to 1."""
         share: Float = np.bincount(self.of, minlength=len(self.words)) / max(len(self.of), 1)
         return share
-
-
-RETURNS_CLASSES = (1.0, FEW_RETURNS, 20.0)
-"""Returns from a pedestrian at which the classes of a plan change."""
 
 
 def of_placement(deployment: Deployment) -> Colouring:
@@ -127,8 +129,6 @@ def _by_weight(weight: Float) -> Colouring:
 
 By = Literal["sensor", "intensity", "instance"]
 
-GOLDEN_RATIO = 0.618033988749895  # of the colour circle, from a road user to the next: neighbours differ most
-
 
 def cloud_colours(frame: Frame, by: By) -> NDArray[np.float32]:
     """Return red, green, blue and opacity (n, 4) of each point, sRGB."""
@@ -156,11 +156,6 @@ def strength_ramp(share: Float) -> Float:
 def sensor_colour(number: int) -> str:
     """Return the web colour of a sensor's points."""
     return SENSOR_COLOURS[number % len(SENSOR_COLOURS)]
-
-
-NEITHER, BOTH, PRESENT_ONLY, KEPT_ONLY = range(4)
-"""Classes of targets by which of the two placements see them."""
-CLASS_WORDS = ("seen by neither", "seen by both", "seen only by the present", "seen only by the kept")
 
 
 def compare(kept: Integer, present: Integer) -> Colouring:

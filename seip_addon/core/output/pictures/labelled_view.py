@@ -35,6 +35,7 @@ LEGEND_GAP, SWATCH = 0.22, 0.3  # inches
 LEGEND_SIZE = 9.5  # points
 BACKGROUND_COLOUR = "#e9edf0"
 HIDDEN_NOTE = "outlined sensors stand behind something"
+GAP = 24  # pixels between the two, and around them
 
 
 def save_labelled_view(  # noqa: PLR0913  # what is written on the picture
@@ -111,9 +112,6 @@ def _draw_foot(
         y = height - MARGIN / 4 - (len(credit) - number - 0.5) * CREDIT_LINE
         plain: Style = {"size": ATTRIBUTION_SIZE, "color": INK, "parse_math": False, "va": "center"}
         foot.text(MARGIN, y, words, **plain)
-
-
-GAP = 24  # pixels between the two, and around them
 
 
 def save_sheet(path: str | os.PathLike[str], view: Image.Image, plan: Image.Image) -> None:

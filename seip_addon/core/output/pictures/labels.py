@@ -15,6 +15,11 @@ LABEL_DIRECTIONS = 16
 LABEL_DISTANCES = (1.0, 1.6, 2.3, 3.2, 4.4, 6.0)  # how far out a label is tried, in multiples of the nearest
 DISTANCE_COSTS = 0.35 * np.repeat(np.array(LABEL_DISTANCES) - 1.0, LABEL_DIRECTIONS)
 """What distance costs, where hiding as much of the subject as any place would costs 1."""
+MOST_LABELS = 60
+MOST_TRIED = 600
+ROOM = 1.1  # length of a street on the map, in lengths of its name, from which on it is named
+REPEATED = 350.0  # pixels between two labels of one street at least
+SPACE = 4.0  # pixels between labels
 
 
 def place_callouts(  # what a label must keep off is of several kinds
@@ -111,13 +116,6 @@ def _places(anchor: Float, reach: Float, outwards: Float) -> Float:
     angle = start + np.pi * 2.0 / LABEL_DIRECTIONS * ((turn + 1) // 2) * np.where(turn % 2, 1.0, -1.0)
     round_anchor = np.stack((np.cos(angle), np.sin(angle)), axis=1) * reach
     return np.concatenate([anchor + factor * round_anchor for factor in LABEL_DISTANCES])
-
-
-MOST_LABELS = 60
-MOST_TRIED = 600
-ROOM = 1.1  # length of a street on the map, in lengths of its name, from which on it is named
-REPEATED = 350.0  # pixels between two labels of one street at least
-SPACE = 4.0  # pixels between labels
 
 
 @dataclass(frozen=True)

@@ -21,6 +21,10 @@ SCHEMA = "seip-verification/1"
 _MOST_BYTES = 1 << 26
 
 Box = tuple[float, float, float, float, float, float, float]
+LEAST_COST = 0.0005
+"""Share of coverage that is shown as 0.1 points."""
+_LEAST_SHIFT, _LEAST_ANGLE = 0.005, 0.05  # metres and degrees that are shown as 0.01 m and 0.1 degrees
+_NAMED = 3  # changes that are named in a sentence
 
 
 @dataclass(frozen=True)
@@ -58,13 +62,6 @@ def load_verification(path: Path) -> VerificationRecord:
     """
     cure = "verify the installation again"
     return read_record(VerificationRecord, read_small(path, _MOST_BYTES, cure), (SCHEMA,), str(path), cure)
-
-
-LEAST_COST = 0.0005
-"""Share of coverage that is shown as 0.1 points."""
-
-_LEAST_SHIFT, _LEAST_ANGLE = 0.005, 0.05  # metres and degrees that are shown as 0.01 m and 0.1 degrees
-_NAMED = 3  # changes that are named in a sentence
 
 
 def pose_text(pose: InstalledSensor) -> str:

@@ -22,6 +22,34 @@ from .model import DetectionLaw, LidarModel
 from .range_equation import MAKER_PROBABILITY, RangeEquation
 from .rosette import Rosette
 
+_CALIBRATION_SUFFIXES = {".json", ".xml", ".yaml", ".yml", ".csv"}  # of single units, as makers deliver them
+CALIBRATED = (1.0, 1.0)
+SHEET_GAINS = (0.09, 2.3)
+"""Gains that sweeps needed in addition to ranges with a reflectivity and a probability of detection."""
+UNSTATED_GAINS = (0.09, 39.0)
+"""The same for ranges without one of these conditions: sweeps of three makes needed 0.09, 0.19 and 39."""
+_UNSTATED = (
+    f"its data sheet states no {{}} at its ranges, and such sensors received {UNSTATED_GAINS[0]:g} to "
+    f"{UNSTATED_GAINS[1]:g} times the power derived from them: measure one, or place it by the criterion road"
+)
+_LAWS = (RangeEquation.model, CarlaDropoff.model)
+_SQRT_8 = math.sqrt(8.0)
+"""Ratio of the ranges at 80 and at 10 % reflectivity if power falls with 1/r² only."""
+_FIELDS = {
+    "rotation_rate_hz": "rotation_rate",
+    "range_noise_std_m": "range_noise_std",
+    "range_noise_growth_per_m": "range_noise_growth",
+}
+"""Fields of a model by their names in a catalogue, which include the unit."""
+_DROPOFF = {
+    "attenuation_per_m": "attenuation",
+    "dropoff_general_rate": "general",
+    "dropoff_intensity_limit": "intensity_limit",
+    "dropoff_zero_intensity": "zero_intensity",
+}
+"""Figures of `CarlaDropoff`, by their names in a catalogue."""
+_VIEW_TOLERANCE = 0.1  # degrees: the rounding of data sheets
+
 
 def load_catalogue(extra: Iterable[str | os.PathLike[str]] = ()) -> dict[str, LidarModel]:
     """Read the shipped models and those of further files, which replace earlier ones with the same key.
@@ -279,37 +307,6 @@ def _channels(value: object) -> int:
     return value
 
 
-_CALIBRATION_SUFFIXES = {".json", ".xml", ".yaml", ".yml", ".csv"}  # of single units, as makers deliver them
-
-CALIBRATED = (1.0, 1.0)
-SHEET_GAINS = (0.09, 2.3)
-"""Gains that sweeps needed in addition to ranges with a reflectivity and a probability of detection."""
-UNSTATED_GAINS = (0.09, 39.0)
-"""The same for ranges without one of these conditions: sweeps of three makes needed 0.09, 0.19 and 39."""
-_UNSTATED = (
-    f"its data sheet states no {{}} at its ranges, and such sensors received {UNSTATED_GAINS[0]:g} to "
-    f"{UNSTATED_GAINS[1]:g} times the power derived from them: measure one, or place it by the criterion road"
-)
-
-_LAWS = (RangeEquation.model, CarlaDropoff.model)
-_SQRT_8 = math.sqrt(8.0)
-"""Ratio of the ranges at 80 and at 10 % reflectivity if power falls with 1/r² only."""
-
-_FIELDS = {
-    "rotation_rate_hz": "rotation_rate",
-    "range_noise_std_m": "range_noise_std",
-    "range_noise_growth_per_m": "range_noise_growth",
-}
-"""Fields of a model by their names in a catalogue, which include the unit."""
-
-_DROPOFF = {
-    "attenuation_per_m": "attenuation",
-    "dropoff_general_rate": "general",
-    "dropoff_intensity_limit": "intensity_limit",
-    "dropoff_zero_intensity": "zero_intensity",
-}
-"""Figures of `CarlaDropoff`, by their names in a catalogue."""
-
 _pair = _several(2)
 _OPTIONAL = Key(_number, None)
 _DETECTION = {
@@ -364,4 +361,3 @@ _ROSETTE = {
     "accumulation_s": Key(number(ACCUMULATION), 0.1),
 }
 """Keys of a rosette: two prisms instead of rotating channels."""
-_VIEW_TOLERANCE = 0.1  # degrees: the rounding of data sheets

@@ -19,6 +19,10 @@ from .rosette import Rosette
 
 DetectionLaw = RangeEquation | CarlaDropoff
 """Law by which returns are detected: physical, or the one of CARLA."""
+MAX_RAYS = 50_000_000
+"""Limit on the rays of a revolution: fifty times the finest type of the study."""
+MAX_ROSETTE_RAYS = 2_000_000
+"""Limit on the rays of a rosette's frame: twenty seconds of a sensor of 100,000 points per second."""
 
 
 def short_name(name: str) -> str:
@@ -232,12 +236,6 @@ class LidarModel:
 def fields_of_view(models: Mapping[str, LidarModel]) -> dict[str, float]:
     """Return the horizontal field of view of each model by its key, radians."""
     return {key: model.field_of_view for key, model in models.items()}
-
-
-MAX_RAYS = 50_000_000
-"""Limit on the rays of a revolution: fifty times the finest type of the study."""
-MAX_ROSETTE_RAYS = 2_000_000
-"""Limit on the rays of a rosette's frame: twenty seconds of a sensor of 100,000 points per second."""
 
 
 def _require_valid(model: LidarModel) -> None:

@@ -31,6 +31,11 @@ from .scanner import BodySurface, MovingTraffic, ReflectiveSurface, Scan, Scanne
 from .sensor import MountedSensor
 from .static_scene import StaticScene
 
+FOREGROUND_SIGMAS, FOREGROUND_MARGIN = 3.0, 0.05
+"""Standard deviations of the range noise, and metres, by which foreground must be nearer than the background."""
+_TIME_TOLERANCE = 1e-6
+"""Seconds, and shares of a frame: tolerance for times that are decimal fractions."""
+
 
 @dataclass(frozen=True)
 class ScanSettings:
@@ -286,13 +291,6 @@ def frame_times(
             "duration or a lower rate"
         )
     return start + np.arange(count) / rate
-
-
-FOREGROUND_SIGMAS, FOREGROUND_MARGIN = 3.0, 0.05
-"""Standard deviations of the range noise, and metres, by which foreground must be nearer than the background."""
-
-_TIME_TOLERANCE = 1e-6
-"""Seconds, and shares of a frame: tolerance for times that are decimal fractions."""
 
 
 def _returns(

@@ -11,6 +11,18 @@ from ...limits import ROAD_USER_SIZE
 from ...progress import Progress
 from ...storage.xml_stream import Attributes, quoted, read_tags
 
+_SHAPES_OF = {
+    "pedestrian": ("pedestrian",),
+    "bicycle": ("bicycle", "scooter"),
+    "motorcycle": ("moped", "motorcycle"),
+    "car": ("passenger", "passenger/sedan", "passenger/hatchback", "passenger/wagon", "taxi", "evehicle", "police"),
+    "van": ("passenger/van", "delivery", "emergency"),
+    "truck": ("firebrigade", "truck", "truck/semitrailer", "truck/trailer"),
+    "bus": ("bus", "bus/coach", "bus/flexible", "bus/trolley"),
+}
+"""Values of guiShape by category; guiShape takes precedence over the vClass."""
+_SHAPES = {shape: category for category, shapes in _SHAPES_OF.items() for shape in shapes}
+
 
 @dataclass(frozen=True)
 class VehicleType:
@@ -50,18 +62,6 @@ _CLASSES = {
 }
 """Default sizes by vClass (SUMO's "Vehicle Type Parameter Defaults"); all other classes are cars."""
 
-_SHAPES_OF = {
-    "pedestrian": ("pedestrian",),
-    "bicycle": ("bicycle", "scooter"),
-    "motorcycle": ("moped", "motorcycle"),
-    "car": ("passenger", "passenger/sedan", "passenger/hatchback", "passenger/wagon", "taxi", "evehicle", "police"),
-    "van": ("passenger/van", "delivery", "emergency"),
-    "truck": ("firebrigade", "truck", "truck/semitrailer", "truck/trailer"),
-    "bus": ("bus", "bus/coach", "bus/flexible", "bus/trolley"),
-}
-"""Values of guiShape by category; guiShape takes precedence over the vClass."""
-
-_SHAPES = {shape: category for category, shapes in _SHAPES_OF.items() for shape in shapes}
 
 BUILT_IN = {
     "DEFAULT_VEHTYPE": CAR,

@@ -31,6 +31,7 @@ _MAX_NEEDLE_HEIGHT = 1 / 300
 
 MAX_THREADS = min(4, os.cpu_count() or 1)
 """Largest useful number of threads that cast: the work between casts holds Python's lock part of the time."""
+_FACE, _DISTANCE = operator.itemgetter(2), operator.itemgetter(3)  # items of a result of Blender's tree
 
 
 class RayCaster(Protocol):
@@ -110,9 +111,6 @@ def make_ray_caster(triangles: Float, engine: Engine = "auto", keep: Boolean | N
     if name == "bvh":
         return BvhRayCaster(triangles, keep)
     raise SeipError(f"unknown ray-casting engine '{engine}'; choose auto, bvh or embree")
-
-
-_FACE, _DISTANCE = operator.itemgetter(2), operator.itemgetter(3)  # items of a result of Blender's tree
 
 
 class BvhRayCaster:

@@ -26,6 +26,9 @@ from ..lidar.model import LidarModel
 from .settings import VisibilitySettings
 from .target_index import TargetIndex
 
+_RADII, _AZIMUTHS = 300, 361
+"""Numbers of radii and azimuths at which a level road is tested for gaps of a rosette."""
+
 
 def resolution_warnings(site: Site, models: Mapping[str, LidarModel], settings: VisibilitySettings) -> tuple[str, ...]:
     """Return warnings about rings too far apart: there, coverage depends on beams, not on line of sight.
@@ -147,10 +150,6 @@ def _first_gap(model: LidarModel, height: float, delta: float, reach: float, til
     missed = np.ones(len(road), dtype=bool)
     missed[index.pairs_within_delta(hits)[1]] = False
     return float(np.hypot(*road[missed].T).min(initial=reach))
-
-
-_RADII, _AZIMUTHS = 300, 361
-"""Numbers of radii and azimuths at which a level road is tested for gaps of a rosette."""
 
 
 def _farthest(poses: Float, targets: Float) -> float:

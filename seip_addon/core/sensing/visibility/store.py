@@ -28,6 +28,7 @@ _CHUNK = ArrayFile(
     {"packed": "u1", "rays": "i8"},
     compressed=False,
 )
+_GRID = re.compile(r"[0-9a-f]{32}\.(npz|pieces|returns\.npz)")
 
 
 class CheckpointFolder:
@@ -149,9 +150,6 @@ class GridFolder:
             except OSError as error:
                 raise SeipError(f"cannot delete {entry}: {error.strerror}; delete it by hand") from error
         return len(entries)
-
-
-_GRID = re.compile(r"[0-9a-f]{32}\.(npz|pieces|returns\.npz)")
 
 
 def _grids(folder: Path) -> list[Path]:
