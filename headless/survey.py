@@ -137,8 +137,8 @@ def survey(
     check(layout)
     file = options.output / "visibility.npz"
     if objective is not None:
-        best = watch.run("early answer", early_answer(layout, objective, file))
-        LOG.info("early answer from a few poses: %s", best or "none")
+        early = watch.run("early answer", early_answer(layout, objective, file))
+        LOG.info("early answer from a few poses: %s", early.best or "none")
     surveyed = watch.run("visibility", see(layout, file, options.scheduler))
     LOG.info(culling_message(surveyed.grid.parameters["triangles"]))
     return surveyed, watch

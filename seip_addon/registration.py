@@ -13,7 +13,7 @@ PARTS = (
     "properties.traffic", "properties.simulation",
     "properties.sections", "properties.scene",
     "session", "scene_survey", "sensor_types", "loose_pieces",
-    "viewport.beam_preview", "viewport.overlays", "viewport.coverage",
+    "viewport.overlays", "viewport.coverage",
     "operators.base", "operators.site", "operators.street_map",
     "operators.sensors", "operators.placement", "live_coverage",
     "operators.results", "operators.view", "operators.traffic", "operators.simulation", "operators.detection",

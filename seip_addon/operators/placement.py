@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import time
 from collections.abc import Generator
-from dataclasses import replace
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import bpy
@@ -15,17 +16,17 @@ from ..core.choosing.placement.objective import Objective, check_objective
 from ..core.counts import counted
 from ..core.errors import SeipError
 from ..core.output.results.answer import answer
-from ..core.progress import Progress
+from ..core.progress import Progress, altered
 from ..core.workflows.detection import DetectionJob
 from ..core.workflows.early_answer import after_early_answer, early_answer
 from ..core.workflows.finalists import check_judged, find_finalists, judge_elsewhere, judged_solution
 from ..core.workflows.placing import place, with_context
-from ..core.workflows.survey import Survey
+from ..core.workflows.survey import Layout, Survey
 from ..core.workflows.traffic_runs import TrafficRuns, found_runs, read_runs
 from ..properties.conversion import output_folder, runs_folder
 from ..scene.write import write_result
-from ..session import SceneState, session
-from ..viewport import coverage
+from ..session import SceneState, scene_of, session
+from ..viewport import coverage, overlays, search
 from .base import Conditional, ForReadyScene, LongWork, Outcome, ShortWork, started
 from .detection import NO_PYTHON, no_python, saved_scene
 from .results import keep_result
@@ -67,8 +68,29 @@ class SEIP_OT_compare_scene(ForReadyScene, LongWork[SceneState], bpy.types.Opera
         session.of(scene).state = result
 
 
+@dataclass(frozen=True, eq=False)
+class _Searching(Progress):
+    """Progress of a search for a placement, with the layout that has its poses."""
+
+    layout: Layout | None = None
+
+
 class _Placing(LongWork[SceneState]):
-    """A mixin: work that ends with a placement."""
+    """A mixin: work that ends with a placement; the best so far is drawn while it is searched."""
+
+    _drawn: tuple[int, ...] = ()
+
+    def _show(self, progress: Progress, duration: str) -> None:
+        super()._show(progress, duration)
+        if isinstance(progress, _Searching) and progress.layout is not None and progress.poses not in {(), self._drawn}:
+            self._drawn = progress.poses
+            with suppress(SeipError):  # the scene was deleted
+                overlays.show(scene_of(self._scene), search.NAME, search.search_overlay(progress.layout, progress))
+
+    def _end(self, context: bpy.types.Context) -> None:
+        for scene in bpy.data.scenes:
+            overlays.hide(scene, search.NAME)
+        super()._end(context)
 
     def conclude(self, scene: bpy.types.Scene, result: SceneState) -> None:
         """Put the sensors into the scene, and all that is needed to go on later into the file."""
@@ -146,8 +168,9 @@ def _placed(
     runs = None if folder is None else (yield from read_runs(found_runs(folder), state.layout))
     check_objective(state.layout.site, state.layout.models, objective)
     grid_file = state.resources.grid_file(state.inputs["visibility"])
-    best = yield from early_answer(state.layout, objective, grid_file, state.resources.cores)
-    return (yield from after_early_answer(best, _searched(state, objective, runs, acceptance)))
+    early = yield from early_answer(state.layout, objective, grid_file, state.resources.cores)
+    steps = after_early_answer(early, _searched(state, objective, runs, acceptance))
+    return (yield from altered(steps, lambda step: _Searching(**vars(step), layout=state.layout)))
 
 
 def _searched(

@@ -12,7 +12,7 @@ from ..core.counts import counted
 from ..core.errors import SeipError
 from ..core.sensing.lidar.catalogue import load_catalogue
 from ..session import session
-from ..viewport import beam_preview
+from ..viewport import beam_preview, overlays
 from .base import Conditional, Outcome, ShortWork
 
 
@@ -93,12 +93,12 @@ class SEIP_OT_preview_beams(bpy.types.Operator):
     bl_idname = "seip.preview_beams"
     bl_label = "Preview Beams"
 
-    def execute(self, _context: bpy.types.Context) -> Outcome:
+    def execute(self, context: bpy.types.Context) -> Outcome:
         """Show or hide them."""
-        if beam_preview.is_shown():
-            beam_preview.hide()
+        if overlays.find(context.scene, beam_preview.NAME):
+            overlays.hide(context.scene, beam_preview.NAME)
         else:
-            beam_preview.show()
+            overlays.show(context.scene, beam_preview.NAME, beam_preview.beam_overlay())
         return {"FINISHED"}
 
 

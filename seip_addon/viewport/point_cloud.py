@@ -12,11 +12,12 @@ from ..overlay import Block, Colour, Entry, Layer, Overlay
 
 NAME = "point cloud"
 RAMP_STEPS = 8
+POINT_SIZE = 2.0  # pixels, at the interface's usual scale
 
 
 def cloud_overlay(frame: Frame, sensors: Sequence[MountedSensor], by: By) -> Overlay:
     """Return a frame's points, coloured by sensor, intensity or instance."""
-    layer = Layer("POINTS", np.ascontiguousarray(frame.points), cloud_colours(frame, by))
+    layer = Layer("POINTS", np.ascontiguousarray(frame.points), cloud_colours(frame, by), POINT_SIZE)
     block = Block(f"{len(frame):,} points at {frame.time:.2f} s", _entries(frame, sensors, by))
     return Overlay((layer,), lambda _scene: block, by)
 

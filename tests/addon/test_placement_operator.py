@@ -9,6 +9,7 @@ from types import SimpleNamespace
 from headless import place
 
 import bpy
+import numpy as np
 import pytest
 
 from seip_addon import scene_status, sensor_types
@@ -21,6 +22,7 @@ from seip_addon.panels import export as export_panel
 from seip_addon.panels import placement as placement_panel
 from seip_addon.scene.sensors import placed_sensors
 from seip_addon.session import session
+from seip_addon.viewport.search import search_overlay
 from tests.builders.drawn_layout import DrawnLayout
 
 OPTIONS = ["--heights", "8", "--grid", "4", "--spacing", "12", "--count", "2", "--sensor", "type1", "--no-render"]
@@ -122,6 +124,24 @@ def test_a_placement_with_the_grid_at_hand_casts_no_ray(junction, monkeypatch):
 def work_of(operator: str, scene: bpy.types.Scene) -> Generator[Progress, None, object]:
     """Return the work of a button, which a thread would do."""
     return getattr(bpy.types, operator).prepare(SimpleNamespace(), scene)
+
+
+def test_the_best_so_far_is_drawn_and_taken_away_again(junction):
+    """What the search reports are the poses of the placement it ends with, and no object is written for them."""
+    objects = set(bpy.data.objects)
+    steps = []
+    placed = finish(work_of("SEIP_OT_solve_placement", junction), steps.append)
+    found = [step for step in steps if step.poses]
+    assert found[-1].poses == tuple(sorted(placed.solution.placement.chosen.tolist()))
+    assert found[0].what.startswith("visibility")  # the early answer
+    posts, eyes = (overlay := search_overlay(placed.layout, found[-1])).layers
+    placed_eyes = sorted(sensor.xyz.tolist() for sensor in placed.solution.deployment.sensors)
+    np.testing.assert_allclose(sorted(eyes.positions.tolist()), placed_eyes, atol=1e-4)
+    assert posts.positions[1::2].tolist() == eyes.positions.tolist()
+    assert [words for words, _ in overlay.labels(junction)] == ["Type 1", "Type 1"]
+    assert overlay.legend(junction).entries[0].words == f"best so far: {found[-1].best}"
+    assert set(bpy.data.objects) == objects
+    assert not session.overlays
 
 
 def test_work_that_is_stopped_at_its_end_leaves_no_trace(junction):

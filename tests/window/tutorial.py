@@ -23,6 +23,7 @@ import bpy
 from bl_ext.user_default.seip.seip_addon import preferences, scene_status
 from bl_ext.user_default.seip.seip_addon.panels import placement, results, sidebar
 from bl_ext.user_default.seip.seip_addon.session import SceneState, session
+from bl_ext.user_default.seip.seip_addon.viewport import search
 from driver import Steps, Window, play
 from mathutils import Vector
 
@@ -140,7 +141,11 @@ def _place(window: Window) -> Steps:
     assert _known() is None or _known().survey is None, "the run that was stopped went on"
     SAID.clear()
     yield from window.press("LEFTMOUSE", button)
+    yield from window.until(_drawn, 60)
+    yield from window.shot("5-searching")
+    assert not _sensors(), "sensors were written before the search ended"
     yield from window.until(lambda: _scene().seip.result.record, 300)
+    assert not _drawn(), "the best so far is still drawn"
     assert any(FIRST_ANSWER.match(sentence) for sentence in SAID), "no answer was shown before the search"
     assert len(_sensors()) == 2, _sensors()
     (OUT / "placement.json").write_text(_scene().seip.result.record, encoding="utf-8")
@@ -341,6 +346,11 @@ def _record() -> dict[str, Any]:
 
 def _known() -> SceneState | None:
     return session.of(_scene()).state
+
+
+def _drawn() -> bool:
+    """Tell whether the best placement so far is drawn in the view."""
+    return search.NAME in session.overlays.get(_scene().session_uid, {})
 
 
 def _sensors() -> list[bpy.types.Object]:
