@@ -26,7 +26,6 @@ NOT_COMPARED = "Not compared with the scene since the file was opened."
 ANOTHER_SITE = "The scene or its settings have changed since this placement: place again."
 NO_SITE = "There is no site yet."
 UNEVALUATED = "There are sensors without figures in the scene: evaluate them."
-OLD_CHECK = "Checked before the file was opened: check again."
 OTHER_SENSORS = "The sensors or their heights have changed since: check again to count their poses."
 
 
@@ -72,7 +71,7 @@ def next_step(scene: bpy.types.Scene) -> str:
         return _next_for_site(scene.seip.site)
     if has_unevaluated(scene):
         return "seip.evaluate_sensors"
-    if not scene.seip.site.checked:
+    if session.of(scene).check is None:
         return "seip.check_site"
     return "seip.solve_placement" if scene.seip.survey.used_types() else "seip.choose_sensors"
 
@@ -133,10 +132,10 @@ def other_goal(scene: bpy.types.Scene) -> str:
 
 
 def stale_check(scene: bpy.types.Scene) -> str:
-    """Return why the scene's check is not of the scene as it is, in a sentence; empty if it is."""
+    """Return why the scene's check is not of the scene as it is, in a sentence; empty if it is, or without a check."""
     check = session.of(scene).check
     if check is None:
-        return OLD_CHECK
+        return ""
     if check.watch.changed:
         return "The scene has changed since the check."
     settings = checked_settings(scene)

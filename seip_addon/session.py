@@ -10,6 +10,7 @@ import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import bpy
@@ -32,6 +33,7 @@ from .core.sensing.scans.simulation import Simulation
 from .core.sensing.traffic.source import TrafficFiles
 from .core.sensing.traffic.trajectories import Trajectories
 from .core.sensing.visibility.visibility_model import VisibilityModel
+from .core.site.check import SiteCheck
 from .core.storage.files import check_folder
 from .core.workflows.returns import SensorReturns
 from .core.workflows.site_places import SitePlaces
@@ -125,7 +127,7 @@ class SceneState:
 
 @dataclass(frozen=True)
 class CheckedScene:
-    """Inputs of a check of a site.
+    """A check of a site, and its inputs.
 
     Parameters
     ----------
@@ -135,6 +137,7 @@ class CheckedScene:
         See `scene_status.checked_settings`.
     """
 
+    found: SiteCheck
     watch: Watch
     settings: SurveySettings | str
 
@@ -259,9 +262,16 @@ class LastVerification:
 
 @dataclass
 class SceneMemory:
-    """What is known of a scene: its state, check, traffic, last scan and last verification."""
+    """What is known of a scene: its state, check, traffic, last scan and last verification.
+
+    Parameters
+    ----------
+    exported : (str, dict of str to path)
+        Record that was exported last, with the files for people: what each is, and where it was written.
+    """
 
     state: SceneState | None = None
+    exported: tuple[str, Mapping[str, Path]] = ("", MappingProxyType({}))
     check: CheckedScene | None = None
     traffic: SceneTraffic | None = None
     scan: LastScan | None = None

@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections.abc import Generator, Mapping, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
-from functools import lru_cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -21,8 +20,7 @@ from ..core.errors import SeipError
 from ..core.output.pictures.colours import compare, packed_counts, unpacked_counts
 from ..core.output.report.sections import write_report
 from ..core.output.results.answer import answer, change_text
-from ..core.output.results.file_names import REPORT_FILES
-from ..core.output.results.placement_record import PlacementRecord, Provenance, load_placement, parsed_record
+from ..core.output.results.placement_record import PlacementRecord, Provenance, parsed_record
 from ..core.output.results.versions import versions
 from ..core.progress import Progress
 from ..core.sensing.scans.sensor import MountedSensor
@@ -46,8 +44,7 @@ from ..session import SceneState, session
 from .base import ForReadyScene, LongWork, Obstacles, Outcome, Result, ShortWork, started
 
 OTHER_TARGETS = "The two placements were made on different targets: only their figures can be compared."
-PLAN, REPORT = "plan.png", REPORT_FILES[0]
-_RECORD = "placement.json"
+PLAN = "plan.png"
 EYE_DISTANCE = 10.0
 """Metres from a sensor's eye to the point that the view turns about."""
 
@@ -99,11 +96,7 @@ class SEIP_OT_look_from_sensor(ForPlacement, ShortWork, bpy.types.Operator):
 
     def act(self, context: bpy.types.Context) -> None:
         """Set the view."""
-        result = context.scene.seip.result
-        label = result.sensors[result.active_sensor].name if result.sensors else ""
-        empty = placed_sensors(context.scene).get(label)
-        if empty is None:
-            raise SeipError(f"the sensor {label} is no longer in the scene: undo, or place again")
+        empty = active_sensor(context.scene)
         if context.space_data is None or context.space_data.type != "VIEW_3D":
             raise SeipError("there is no 3D view here: press this in the sidebar of one")
         eye = empty.matrix_world.translation
@@ -113,6 +106,15 @@ class SEIP_OT_look_from_sensor(ForPlacement, ShortWork, bpy.types.Operator):
         view.view_rotation = (-way).to_track_quat("Z", "Y")
         view.view_distance = EYE_DISTANCE
         view.view_location = eye + EYE_DISTANCE * way
+
+
+def active_sensor(scene: bpy.types.Scene) -> bpy.types.Object:
+    """Return the empty of the sensor that is active in the list, or raise a `SeipError`."""
+    label = scene.seip.result.active_label()
+    empty = placed_sensors(scene).get(label)
+    if empty is None:
+        raise SeipError(f"the sensor {label} is no longer in the scene: undo, or place again")
+    return empty
 
 
 def _middle_of_road(scene: bpy.types.Scene) -> Vector:
@@ -332,6 +334,7 @@ class SEIP_OT_export_result(_Writes[SceneState], bpy.types.Operator):
     def conclude(self, scene: bpy.types.Scene, result: SceneState) -> None:
         """Report where the files are."""
         session.of(scene).state = result
+        session.of(scene).exported = result.record, {"Plan": self._folder / PLAN}
         self.report({"INFO"}, f"written to {self._folder}")
 
 
@@ -372,7 +375,7 @@ class SEIP_OT_write_report(_Writes[tuple[SceneState, tuple[Path, ...]]], bpy.typ
     def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, tuple[SceneState, tuple[Path, ...]]]:
         """Return the work: the export where the folder holds another result, and the report."""
         folder = _checked_folder(scene)
-        if _holds(folder, scene.seip.result.record, _time_of(folder / _RECORD)):
+        if exported_files(scene).get("Plan") == folder / PLAN:
             return _reported(folder, scene_survey.with_placement(scene))
         return started(_reported(folder, _exported(folder, scene)))
 
@@ -380,6 +383,8 @@ class SEIP_OT_write_report(_Writes[tuple[SceneState, tuple[Path, ...]]], bpy.typ
         """Report where the files are."""
         state, written = result
         session.of(scene).state = state
+        files = {"Plan": written[0].with_name(PLAN), "Report": written[0]}
+        session.of(scene).exported = state.record, files
         self.report({"INFO"}, f"written: {' and '.join(path.name for path in written)} in {written[0].parent}")
 
 
@@ -391,33 +396,6 @@ def _reported(
 
 
 def exported_files(scene: bpy.types.Scene) -> dict[str, Path]:
-    """Return the plan and the report of the present placement by name, as far as the folder of the result has them."""
-    folder = Path(bpy.path.abspath(scene.seip.result.folder))
-    written = _time_of(folder / _RECORD)
-    if no_folder(scene) or written is None or not _holds(folder, scene.seip.result.record, written):
-        return {}
-    times = {name: _time_of(folder / name) for name in (PLAN, REPORT)}
-    return {
-        name: folder / name for name, time in times.items() if time is not None and (name == PLAN or time >= written)
-    }
-
-
-def _time_of(path: Path) -> int | None:
-    """Return when a file was written, in nanoseconds, or None if it is not there."""
-    try:
-        return path.stat().st_mtime_ns
-    except OSError:
-        return None
-
-
-@lru_cache(maxsize=8)  # a panel asks at every redraw
-def _holds(folder: Path, record: str, _written: int | None) -> bool:
-    """Return whether a folder holds the export of a placement, whose record was written at the time given."""
-    try:
-        written = load_placement(folder / _RECORD)
-    except SeipError:
-        return False
-    present = parsed_record(record)
-    # The goal is compared too: with other shares of the road users, the same sensors have another value in the files.
-    one, other = ((of.sensors, of.inputs, of.notes, of.request.goal) for of in (written, present))
-    return one == other
+    """Return the plan and the report of the present placement as they were written since the file was opened."""
+    record, files = session.of(scene).exported
+    return {what: path for what, path in files.items() if record == scene.seip.result.record and path.is_file()}

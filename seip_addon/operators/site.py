@@ -10,10 +10,9 @@ import bpy
 from .. import preferences, scene_status, selection, sensor_types
 from ..core.counts import counted
 from ..core.errors import SeipError
-from ..core.output.results.answer import sentence
 from ..core.output.results.placement_record import relevant_warnings
 from ..core.progress import Progress, finish
-from ..core.site.check import SceneContents, SiteCheck, check_site
+from ..core.site.check import Problem, SceneContents, SiteCheck, check_site
 from ..core.site.roles import Role
 from ..core.site.scene_geometry import SceneGeometry
 from ..core.site.site import Site
@@ -26,7 +25,7 @@ from ..core.world.openstreetmap.map_links import parsed_position
 from ..core.world.streetscape.site_file import DESCRIPTION_SUFFIX
 from ..properties import traffic
 from ..properties.conversion import absolute
-from ..properties.site import ROLE_ITEMS, SEIP_PG_problem, SEIP_PG_site
+from ..properties.site import ROLE_ITEMS, SEIP_PG_site
 from ..scene import contract, roles
 from ..scene.build import build_scene, remove_site
 from ..scene.changes import watch
@@ -45,8 +44,6 @@ NO_NEW_SITE = "Paste latitude and longitude, or a link of a web map, into New Si
 NO_PLACE = "Choose a junction, or give latitude and longitude"
 COPIED = ("source", "position", "region_shape", "radius", "osm", "terrain", "terrain_epsg")
 """Properties of a choice that a site in a new scene takes over."""
-SHARE_OF_VIEW = 0.6
-"""Of a drawn area in the size of the view."""
 AREA_ITEMS = tuple(item for item in ROLE_ITEMS if Role[item[0]] in roles.AREAS)
 
 
@@ -305,27 +302,23 @@ class SEIP_OT_assign_role(_WritesScene, ShortWork, bpy.types.Operator):
         self.report({"INFO"}, f"{change(context.scene, context.selected_objects, role)} {what} the {role.value}")
 
 
-class SEIP_OT_add_area(_WritesScene, bpy.types.Operator):
-    """Add a flat area in a role, at the 3D cursor or in the middle of the view; go into Edit Mode to shape it"""
+class _InObjectMode(_WritesScene):
+    """A mixin for operators that cannot be used in Edit Mode."""
+
+    @classmethod
+    def why_not(cls, context: bpy.types.Context) -> str:
+        """Return a reason in another mode than Object Mode."""
+        return super().why_not(context) or ("" if context.mode == "OBJECT" else "Leave Edit Mode first")
+
+
+class SEIP_OT_add_area(_InObjectMode, bpy.types.Operator):
+    """Add a flat area in a role at the 3D cursor; go into Edit Mode to shape it"""
 
     bl_idname = "seip.add_area"
     bl_label = "Draw Area"
     bl_options = {"REGISTER", "UNDO"}
 
-    role: bpy.props.EnumProperty(
-        name="Role",
-        description="Role of the area in the placement",
-        items=AREA_ITEMS,
-    )
-    place: bpy.props.EnumProperty(
-        name="Place",
-        description="Position of the area",
-        items=(
-            ("VIEW", "View", "Middle of the view, at the height of the 3D cursor, sized to the view"),
-            ("CURSOR", "3D Cursor", "At the 3D cursor"),
-        ),
-        default="CURSOR",
-    )
+    role: bpy.props.EnumProperty(name="Role", description="Role of the area in the placement", items=AREA_ITEMS)
     size: bpy.props.FloatVectorProperty(
         name="Size",
         description="Lengths along x and y",
@@ -345,26 +338,10 @@ class SEIP_OT_add_area(_WritesScene, bpy.types.Operator):
         max=360,
     )
 
-    @classmethod
-    def why_not(cls, context: bpy.types.Context) -> str:
-        """Return a reason if no object can be added."""
-        in_edit_mode = "" if context.mode == "OBJECT" else "Leave Edit Mode first"
-        return super().why_not(context) or in_edit_mode
-
-    def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> Outcome:
-        """Take the size from the view where the area is laid there."""
-        view = context.region_data
-        if self.place == "VIEW" and view is not None:
-            side = max(1.0, round(SHARE_OF_VIEW * view.view_distance))
-            self.size = (side, side)
-        return self.execute(context)
-
     def execute(self, context: bpy.types.Context) -> Outcome:
         """Add it, selected and active."""
-        middle = context.scene.cursor.location.copy()
-        if self.place == "VIEW" and context.region_data is not None:
-            middle.xy = context.region_data.view_location.xy
-        obj = roles.add_area(context.scene, Role[self.role], tuple(middle), tuple(self.size), self.turn, self.corners)
+        middle = tuple(context.scene.cursor.location)
+        obj = roles.add_area(context.scene, Role[self.role], middle, tuple(self.size), self.turn, self.corners)
         selection.select_alone(context, obj)
         return {"FINISHED"}
 
@@ -387,21 +364,10 @@ class SEIP_OT_check_site(LongWork[SiteCheck], bpy.types.Operator):
         return _checked(contents, settings)
 
     def conclude(self, scene: bpy.types.Scene, result: SiteCheck) -> None:
-        """List what was found."""
-        session.of(scene).check = CheckedScene(self._watch, self._settings)
-        site = scene.seip.site
-        site.checked = True
-        site.counts.clear()
-        for what, value in result.counts.items():
-            one = site.counts.add()
-            one.name, one.value = what, value
-        site.problems.clear()
-        for problem in result.problems:
-            listed = site.problems.add()
-            listed.name, listed.text = problem.obj, sentence(problem.text)
-            listed.is_error = problem.severity == "ERROR"
+        """Hold what was found."""
+        session.of(scene).check = CheckedScene(result, self._watch, self._settings)
         bpy.context.window_manager.seip_sections.follow_steps()
-        self.report({"INFO"}, in_short(site.problems))
+        self.report({"INFO"}, in_short(result.problems))
 
 
 def _checked(contents: SceneContents, settings: SurveySettings | SeipError) -> Generator[Progress, None, SiteCheck]:
@@ -417,55 +383,33 @@ def _checked(contents: SceneContents, settings: SurveySettings | SeipError) -> G
     return (yield from check_site(contents, laid_out))
 
 
-def in_short(problems: Iterable[SEIP_PG_problem]) -> str:
+def in_short(problems: Iterable[Problem]) -> str:
     """Return the number of errors and warnings as text; "no problem" where there is none."""
-    kinds = [problem.is_error for problem in problems]
+    kinds = [problem.severity == "ERROR" for problem in problems]
     errors, warnings = counted(sum(kinds), "error"), counted(len(kinds) - sum(kinds), "warning")
     if not kinds:
         return "no problem"
     return f"{errors}, {warnings}" if any(kinds) else warnings
 
 
-class SEIP_OT_show_problem(ShortWork, bpy.types.Operator):
+class SEIP_OT_show_problem(_InObjectMode, ShortWork, bpy.types.Operator):
     """Select the object with the problem, and bring it into view"""
 
     bl_idname = "seip.show_problem"
     bl_label = "Show Object"
     bl_options = {"REGISTER", "UNDO"}
 
-    number: bpy.props.IntProperty(name="Number", description="Number of the problem in the list, from 0", min=0)
+    object: bpy.props.StringProperty(name="Object", description="Name of the object")
 
     def act(self, context: bpy.types.Context) -> None:
         """Select it alone, and frame it."""
-        obstacle = nothing_to_show(context, self.number)
-        if obstacle:
-            raise SeipError(obstacle)
-        obj = context.view_layer.objects[context.scene.seip.site.problems[self.number].name]
+        obj = context.view_layer.objects.get(self.object)
+        if obj is None:
+            raise SeipError(f"the object {self.object!r} is not in this view layer")
+        if not obj.visible_get():
+            raise SeipError(f"the object {self.object!r} is hidden: show it first")
         selection.select_alone(context, obj)
-        _frame_selected(context)
-
-
-def nothing_to_show(context: bpy.types.Context, number: int) -> str:
-    """Return why the object of a problem cannot be shown, or ""."""
-    problems = context.scene.seip.site.problems
-    if number >= len(problems):
-        return f"there is no problem {number}: check the site again"
-    name = problems[number].name
-    if not name:
-        return "this problem concerns the whole scene"
-    obj = context.view_layer.objects.get(name)
-    if obj is None:
-        return f"the object {name!r} is not in this view layer"
-    if not obj.visible_get():
-        return f"the object {name!r} is hidden: show it first"
-    return "" if context.mode == "OBJECT" else "leave Edit Mode first"
-
-
-def _frame_selected(context: bpy.types.Context) -> None:
-    """Bring what is selected into the 3D view that was clicked in."""
-    area = context.area
-    if area is None or area.type != "VIEW_3D":
-        return
-    region = next(region for region in area.regions if region.type == "WINDOW")
-    with context.temp_override(region=region):
-        bpy.ops.view3d.view_selected()
+        if context.area is not None and context.area.type == "VIEW_3D":
+            region = next(region for region in context.area.regions if region.type == "WINDOW")
+            with context.temp_override(region=region):
+                bpy.ops.view3d.view_selected()

@@ -6,9 +6,10 @@ from collections.abc import Generator
 from itertools import chain, count
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
 
 import bpy
+import numpy as np
+from numpy.typing import NDArray
 
 from .. import last_scan, scene_survey
 from ..core.errors import SeipError
@@ -16,15 +17,16 @@ from ..core.progress import Progress
 from ..core.sensing.visibility.sight_lines import pose_at, sight_lines
 from ..scene import contract
 from ..scene.coverage_colours import colour_coverage
-from ..scene.sensors import placed_sensors, pose_of
+from ..scene.sensors import pose_of
 from ..scene.write import coverage_of
 from ..session import SceneState, session
 from ..viewport import coverage, overlays
+from ..viewport.picture import view_pixels
 from ..viewport.point_cloud import NAME as CLOUD
 from ..viewport.sight_lines import NAME as SIGHT
 from ..viewport.sight_lines import sight_overlay
 from .base import Conditional, LongWork, Outcome, attempt
-from .results import ForPlacement, not_evaluated
+from .results import ForPlacement, active_sensor, not_evaluated
 
 NO_COVERAGE = "There is no coverage to show: place sensors first."
 
@@ -66,24 +68,12 @@ class SEIP_OT_colour_coverage(Conditional, bpy.types.Operator):
         return outcome
 
 
-_items: list[tuple[str, str, str]] = []
-"""Blender does not keep the strings of a dynamic list: they must stay alive here."""
-
-
-def _sensors(_operator: object, context: bpy.types.Context | None) -> list[tuple[str, str, str]]:
-    there = placed_sensors(context.scene) if context else {}
-    _items[:] = [(label, label, obj.name) for label, obj in there.items()] or [("NONE", "None", "Place sensors first")]
-    return _items
-
-
 class SEIP_OT_show_sight_lines(ForPlacement, LongWork[SceneState], bpy.types.Operator):
-    """Draw lines from a sensor to the targets that it sees, and squares on those in its range that it does not see"""
+    """Draw lines from the sensor that is active in the list to the targets that it sees, and squares on those in its range that it does not see"""  # noqa: E501  # a tooltip is one line
 
     bl_idname = "seip.show_sight_lines"
     bl_label = "Show Sight Lines"
     bl_options = {"REGISTER"}  # nothing in the file changes
-
-    sensor: bpy.props.EnumProperty(name="Sensor", description="Sensor that the lines start from", items=_sensors)
 
     def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, SceneState]:
         """Return the job that restores the placement."""
@@ -92,18 +82,16 @@ class SEIP_OT_show_sight_lines(ForPlacement, LongWork[SceneState], bpy.types.Ope
     def conclude(self, scene: bpy.types.Scene, result: SceneState) -> None:
         """Draw them."""
         session.of(scene).state = result
-        obj = placed_sensors(scene).get(self.sensor)
+        obj, label = active_sensor(scene), scene.seip.result.active_label()
         survey, _ = result.placed()
-        if obj is None:
-            raise SeipError(f"there is no sensor {self.sensor!r} in the scene: undo, or place again")
         key = str(obj.get(contract.SENSOR))
         pose = pose_at(survey.site.candidates, key, *pose_of(obj))
         if pose is None:
-            raise SeipError(f"{self.sensor} is not at a candidate pose: move it back, or place again")
+            raise SeipError(f"{label} is not at a candidate pose: move it back, or place again")
         settings = survey.settings
         row = survey.grid.sees(pose)
         sight = sight_lines(survey.site, pose, survey.models[key], row, settings.visibility.delta, settings.engine)
-        overlays.show(scene, SIGHT, sight_overlay(sight, self.sensor))
+        overlays.show(scene, SIGHT, sight_overlay(sight, label))
 
 
 class SEIP_OT_hide_overlay(bpy.types.Operator):
@@ -150,26 +138,19 @@ class SEIP_OT_save_picture(ForPlacement, LongWork[SceneState], bpy.types.Operato
                 "there is no viewport here to take a picture of: press this in the sidebar of one, or export the files "
                 "with the rendered view"
             )
-        save_viewport_sheet(self._path, scene, area, result)
+        save_viewport_sheet(self._path, result, view_pixels(scene, area))
         self.report({"INFO"}, f"written {self._path}")
 
 
-def save_viewport_sheet(path: Path, scene: bpy.types.Scene, area: bpy.types.Area, state: SceneState) -> None:
-    """Write what a viewport shows, and the plan beside it."""
+def save_viewport_sheet(path: Path, state: SceneState, pixels: NDArray[np.uint8]) -> None:
+    """Write a picture of a viewport, and the plan beside it."""
     from PIL import Image  # noqa: PLC0415  # pictures take half a second to come, which nobody waits for at start
-
-    from ..viewport.picture import view_pixels  # noqa: PLC0415  # as above
-
-    _save_sheet(path, state, Image.fromarray(view_pixels(scene, area)))
-
-
-def _save_sheet(path: Path, state: SceneState, view: Any) -> None:  # noqa: ANN401  # PIL's image, not loaded yet
-    from PIL import Image  # noqa: PLC0415  # as above
 
     from ..core.output.pictures.labelled_view import save_sheet  # noqa: PLC0415  # as above
     from ..core.output.pictures.plan_view import save_plan_view  # noqa: PLC0415  # as above
 
     survey, solution = state.placed()
+    view = Image.fromarray(pixels)
     with TemporaryDirectory(prefix="seip-") as folder:
         drawn = Path(folder) / "plan.png"
         save_plan_view(drawn, survey.geometry, survey.site, solution.deployment, solution.caption)

@@ -6,34 +6,19 @@ import bpy
 
 from ..operators.site import EXTRACTS
 
-OPENDRIVE = "*.xodr"
 
+class SEIP_FH_map(bpy.types.FileHandler):
+    """A map or an extract that is dropped into a 3D view; Blender matches only the last suffix of a name."""
 
-class _Dropped:
-    """A mixin: a file that is dropped into a 3D view is imported."""
-
+    bl_idname = "SEIP_FH_map"
+    bl_label = "OpenDRIVE or OpenStreetMap"
     bl_import_operator = "seip.choose_map"
+    bl_file_extensions = ".xodr;.osm;.gz"
 
     @classmethod
     def poll_drop(cls, context: bpy.types.Context) -> bool:
         """Return whether this is a 3D view."""
         return context.area is not None and context.area.type == "VIEW_3D"
-
-
-class SEIP_FH_opendrive(_Dropped, bpy.types.FileHandler):
-    """A map."""
-
-    bl_idname = "SEIP_FH_opendrive"
-    bl_label = "OpenDRIVE"
-    bl_file_extensions = ".xodr"
-
-
-class SEIP_FH_openstreetmap(_Dropped, bpy.types.FileHandler):
-    """An extract; of a name with two suffixes Blender looks at the last alone."""
-
-    bl_idname = "SEIP_FH_openstreetmap"
-    bl_label = "OpenStreetMap"
-    bl_file_extensions = ".osm;.gz"
 
 
 class SEIP_MT_main(bpy.types.Menu):
@@ -65,7 +50,7 @@ STEPS: tuple[tuple[str, ...], ...] = (
 
 def draw_import(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
     """Draw what File ▸ Import gets."""
-    for text, pattern in (("OpenDRIVE (.xodr)", OPENDRIVE), ("OpenStreetMap (.osm)", EXTRACTS)):
+    for text, pattern in (("OpenDRIVE (.xodr)", "*.xodr"), ("OpenStreetMap (.osm)", EXTRACTS)):
         menu.layout.operator("seip.choose_map", text=text).filter_glob = pattern
 
 

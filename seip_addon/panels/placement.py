@@ -21,6 +21,7 @@ from ..operators.results import no_placement
 from ..operators.sensors import SEIP_MT_survey_presets
 from ..scene.sensors import labelled_sensors
 from ..sensor_edits import sensor_edits
+from ..session import session
 from .sections import BETWEEN, Status, draw_sections
 from .sidebar import RowList, draw_path, draw_reason, draw_run, draw_settings, is_narrow, settings_column
 from .wrapped_text import BOX, draw_lines, draw_sentence, sidebar_width
@@ -32,8 +33,6 @@ _SHOWN = {
 }
 """Properties of the objective that are shown for each kind of scenarios."""
 
-
-BARE = sentence(NO_OBSTACLES_MESSAGE)
 NAME_SHARE = 0.68
 """Share of a row that the name of a figure takes."""
 NUMBER_SHARE = 0.3
@@ -90,8 +89,10 @@ def draw(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     obstacle = scene_status.obstacle(scene)
     if obstacle:
         draw_sentence(layout, obstacle, icon="ERROR")
-    elif any(one.text == BARE for one in scene.seip.site.problems) and not scene_status.stale_check(scene):
-        draw_sentence(layout, BARE, icon="ERROR")  # the result says little of a real site: not only in a closed section
+    elif (check := session.of(scene).check) and not scene_status.stale_check(scene):
+        for problem in check.found.problems:  # the result says little of a real site: not only in a closed section
+            if problem.text == NO_OBSTACLES_MESSAGE:
+                draw_sentence(layout, sentence(problem.text), icon="ERROR")
     if not no_placement(scene):
         _draw_answer(layout, scene)
     elif scene_status.has_unevaluated(scene):

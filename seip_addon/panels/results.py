@@ -19,7 +19,7 @@ from ..viewport.point_cloud import NAME as CLOUD
 from ..viewport.sight_lines import NAME as SIGHT
 from . import placement
 from .sections import Status, draw_sections
-from .sidebar import RowList, draw_reason, draw_run, is_running
+from .sidebar import RowList, draw_reason, draw_run
 from .wrapped_text import draw_sentence
 
 ASPECTS: dict[Aspect, str] = {"returns": "Returns", "seen": "Seen", "times": "Sensors", "weights": "Weights"}
@@ -64,12 +64,10 @@ def _draw_sight(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     column.label(text="Sight Lines")
     overlay = overlays.find(context.scene, SIGHT)
     row = column.row(align=True)
-    words = "From Sensor" if overlay is None else overlay.about
-    row.operator_menu_enum("seip.show_sight_lines", "sensor", text=words, icon="LIGHT_SPOT")
+    label = context.scene.seip.result.active_label() or "Sensor"
+    draw_run(row, "seip.show_sight_lines", icon="LIGHT_SPOT", text=f"From {label}", in_one_row=True)
     if overlay is not None:
         row.operator("seip.hide_overlay", text="", icon="X").name = SIGHT
-    if is_running("seip.show_sight_lines"):
-        draw_run(column, "seip.show_sight_lines")
     draw_reason(column, no_placement(context.scene))
 
 
@@ -131,8 +129,8 @@ def draw(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     heading.label(text="Sensor")
     heading.label(text="Sees Alone")
     _draw_list(layout, SEIP_UL_chosen, result, "sensors", "active_sensor")
-    label = result.sensors[result.active_sensor].name if 0 <= result.active_sensor < len(result.sensors) else ""
-    layout.operator("seip.look_from_sensor", icon="HIDE_OFF", text=f"View from {label or 'Sensor'}")
+    text = f"View from {result.active_label() or 'Sensor'}"
+    layout.operator("seip.look_from_sensor", icon="HIDE_OFF", text=text)
     if session.following is None:
         draw_run(layout, "seip.follow_sensors", icon="ORIENTATION_GLOBAL")
     else:

@@ -50,6 +50,11 @@ class SEIP_PG_result(SEIP_PG_placement):
         default=False,
     )
 
+    def active_label(self) -> str:
+        """Return the label of the sensor that is active in the list, or ""."""
+        number = self.active_sensor
+        return self.sensors[number].name if number in range(len(self.sensors)) else ""
+
     def keep(self, record: str, targets: str, seen: str) -> None:
         """Keep a placement as the current one, with a row for each of its sensors."""
         self.record, self.targets, self.seen = record, targets, seen

@@ -180,4 +180,4 @@ def test_a_check_holds_until_scene_or_settings_change(known, tmp_path):
     bpy.context.view_layer.update()
     assert scene_status.stale_check(scene) == "The scene has changed since the check."
     bpy.ops.seip.check_site()
-    assert scene_status.stale_check(reopened(tmp_path)) == scene_status.OLD_CHECK
+    assert site.status(reopened(tmp_path)).result[0] == "not checked"

@@ -86,9 +86,9 @@ def _load_example(window: Window) -> Steps:
     yield from window.open_sidebar("SEIP")
     yield from window.picture("1-sidebar")
     yield from window.click_in_view("seip.load_example(")
-    yield from window.until(lambda: session.running is None and _scene().seip.site.checked, 120)
+    yield from window.until(lambda: session.running is None and session.of(_scene()).check, 120)
     yield 1.0
-    assert not _scene().seip.site.problems, [one.text for one in _scene().seip.site.problems]
+    assert not session.of(_scene()).check.found.problems
     assert not {"Cube", "Light"} & set(_scene().objects.keys())
     bpy.ops.wm.save_as_mainfile(filepath=str(OUT / "example.blend"), copy=True)  # for the batch command
     bpy.ops.wm.save_as_mainfile(filepath=str(OUT / "junction.blend"))
@@ -295,7 +295,7 @@ def _import_map(window: Window) -> Steps:
     yield from window.shot("12-dialog")
     yield from window.press("RET")
     yield from window.until(lambda: session.running is None and set(bpy.data.scenes) - before, 120)
-    yield from window.until(lambda: session.running is None and _scene().seip.site.checked, 60)
+    yield from window.until(lambda: session.running is None and session.of(_scene()).check, 60)
     assert _scene() not in before
 
 
