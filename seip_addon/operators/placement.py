@@ -1,4 +1,4 @@
-"""Operators that compute visibility, solve a placement, compare it with its scene, and edit its constraints."""
+"""Operators that solve a placement, compare it with its scene, and edit its constraints."""
 
 from __future__ import annotations
 
@@ -13,7 +13,6 @@ import bpy
 from .. import preferences, scene_status, scene_survey, selection
 from ..core.acceptance import Acceptance
 from ..core.choosing.placement.objective import Objective, check_objective
-from ..core.counts import counted
 from ..core.errors import SeipError
 from ..core.output.results.answer import answer
 from ..core.progress import Progress, altered
@@ -21,7 +20,7 @@ from ..core.workflows.detection import DetectionJob
 from ..core.workflows.early_answer import after_early_answer, early_answer
 from ..core.workflows.finalists import check_judged, find_finalists, judge_elsewhere, judged_solution
 from ..core.workflows.placing import place, with_context
-from ..core.workflows.survey import Layout, Survey
+from ..core.workflows.survey import Layout
 from ..core.workflows.traffic_runs import TrafficRuns, found_runs, read_runs
 from ..properties.conversion import output_folder, runs_folder
 from ..scene.write import write_result
@@ -30,26 +29,6 @@ from ..viewport import coverage, overlays, search
 from .base import Conditional, ForReadyScene, LongWork, Outcome, ShortWork, started
 from .detection import NO_PYTHON, no_python, saved_scene
 from .results import keep_result
-
-
-class SEIP_OT_compute_visibility(ForReadyScene, LongWork[tuple[SceneState, Survey]], bpy.types.Operator):
-    """Compute which targets on the road are visible from each candidate pose"""
-
-    bl_idname = "seip.compute_visibility"
-    bl_label = "Compute Visibility"
-    bl_options = {"REGISTER"}  # nothing in the file changes
-
-    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, tuple[SceneState, Survey]]:
-        """Read the scene where it has changed."""
-        return scene_survey.with_visibility_of(scene_survey.survey(scene))
-
-    def conclude(self, scene: bpy.types.Scene, result: tuple[SceneState, Survey]) -> None:
-        """Hold the grid."""
-        state, survey = result
-        session.of(scene).state = state
-        site = survey.site
-        targets, poses = counted(len(site.targets), "target"), counted(len(site.candidates), "pose")
-        self.report({"INFO"}, f"visibility of {targets} from {poses} is known")
 
 
 class SEIP_OT_compare_scene(ForReadyScene, LongWork[SceneState], bpy.types.Operator):

@@ -29,7 +29,6 @@ from ..core.storage.files import check_folder, digest
 from ..core.workflows.moved_sensors import evaluate_moved_sensors
 from ..core.workflows.records import record_of
 from ..core.workflows.returns import SensorReturns
-from ..core.workflows.survey import Survey
 from ..scene.blend_file import save_blend
 from ..scene.coverage_colours import recolour, show_seen_by
 from ..scene.gltf import save_glb
@@ -268,11 +267,9 @@ class SEIP_OT_evaluate_sensors(ForReadyScene, LongWork[SceneState], bpy.types.Op
         """Read the poses of the sensors; those without a placement are evaluated under the goal of the panel."""
         mounted = read_sensors(scene, preferences.catalogue(), hidden=True)
         text, names = scene.seip.result.record, position_names(scene)
-        if not text:
-            surveying = scene_survey.with_visibility_of(scene_survey.survey(scene))
-            return _evaluated(surveying, scene.seip.goal.objective(), mounted, names)
-        goal = parsed_record(text).request.goal
-        return _evaluated(scene_survey.with_grid_of_placement(scene), goal, mounted, names)
+        record = parsed_record(text) if text else None
+        objective = scene.seip.goal.objective() if record is None else record.request.goal
+        return _evaluated(scene_survey.survey(scene), record, objective, mounted, names)
 
     def conclude(self, scene: bpy.types.Scene, result: SceneState) -> None:
         """Make the sensors at their present poses the placement."""
@@ -282,12 +279,16 @@ class SEIP_OT_evaluate_sensors(ForReadyScene, LongWork[SceneState], bpy.types.Op
 
 
 def _evaluated(
-    finding: Generator[Progress, None, tuple[SceneState, Survey]],
+    surveying: Generator[Progress, None, SceneState],
+    record: PlacementRecord | None,
     objective: Objective,
     mounted: Sequence[MountedSensor],
     places: Mapping[str, str],
 ) -> Generator[Progress, None, SceneState]:
-    state, survey = yield from finding
+    if record is None:
+        state, survey = yield from scene_survey.with_visibility((yield from surveying))
+    else:
+        state, survey = yield from scene_survey.with_grid_of(surveying, record)
     solution = yield from evaluate_moved_sensors(survey, objective, mounted, places)
     return replace(state, solution=solution)
 

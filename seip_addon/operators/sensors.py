@@ -37,14 +37,15 @@ class SEIP_OT_add_catalogue(Conditional, ShortWork, bpy.types.Operator):
         context.window_manager.fileselect_add(self)
         return {"RUNNING_MODAL"}
 
-    def act(self, _context: bpy.types.Context) -> None:
+    def act(self, context: bpy.types.Context) -> None:
         """Read it, and keep its name."""
         path = Path(bpy.path.abspath(self.filepath))
         shipped = load_catalogue()
         models = load_catalogue([path])
         if path in preferences.catalogue_files():
             raise SeipError(f"{path.name} is a catalogue already: nothing was added")
-        preferences.add_catalogue(str(path))
+        preferences.own().catalogues.add().path = str(path)
+        context.preferences.is_dirty = True
         sensor_types.refresh()
         changed = sum(1 for key, model in models.items() if key not in shipped or model.source != shipped[key].source)
         self.report({"INFO"}, f"{path.name}: {changed} sensor types added or replaced")
@@ -59,9 +60,13 @@ class SEIP_OT_remove_catalogue(Conditional, ShortWork, bpy.types.Operator):
 
     index: bpy.props.IntProperty(name="Number", description="Index of the catalogue, from 0", min=0)
 
-    def act(self, _context: bpy.types.Context) -> None:
+    def act(self, context: bpy.types.Context) -> None:
         """Forget it."""
-        preferences.remove_catalogue(self.index)
+        files = preferences.own().catalogues
+        if self.index >= len(files):
+            raise SeipError(f"there is no catalogue {self.index}: there are {len(files)}, counted from 0")
+        files.remove(self.index)
+        context.preferences.is_dirty = True
         sensor_types.refresh()
 
 

@@ -39,7 +39,7 @@ class SEIP_MT_main(bpy.types.Menu):
 
 STEPS: tuple[tuple[str, ...], ...] = (
     ("load_example", "download_map", "choose_map", "build_site", "check_site"),
-    ("add_catalogue", "preview_beams", "compute_visibility", "solve_placement"),
+    ("add_catalogue", "preview_beams", "solve_placement"),
     ("evaluate_sensors", "export_result"),
     ("colour_coverage", "save_picture"),
     ("load_traffic", "simulate_traffic", "scan_frame", "write_dataset", "detect"),

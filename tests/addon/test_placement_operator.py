@@ -115,7 +115,7 @@ def test_another_goal_makes_placing_the_next_step(junction, monkeypatch):
 
 
 def test_a_placement_with_the_grid_at_hand_casts_no_ray(junction, monkeypatch):
-    bpy.ops.seip.compute_visibility()
+    bpy.ops.seip.solve_placement()
     for caster in (BvhRayCaster, EmbreeRayCaster):
         monkeypatch.setattr(caster, "cast", None)
     assert bpy.ops.seip.solve_placement() == {"FINISHED"}
@@ -152,7 +152,7 @@ def test_work_that_is_stopped_at_its_end_leaves_no_trace(junction):
     seen = dict(vars(before))
     placed = finish(work_of("SEIP_OT_solve_placement", junction))
     assert len(placed.solution.deployment.sensors) == 3
-    for name in ("compute_visibility", "follow_sensors", "save_picture"):
+    for name in ("follow_sensors", "save_picture"):
         finish(work_of(f"SEIP_OT_{name}", junction))
         assert session.of(junction).state is before
         assert vars(before) == seen
