@@ -79,18 +79,11 @@ def _update(followed: FollowedSensors, scene: bpy.types.Scene) -> None:
     mounted, rows, returns = zip(*followed.sensors.values(), strict=True) if followed.sensors else ((), (), ())
     seen_by: Integer = np.sum(rows, axis=0, dtype=np.int64)
     followed.coverage = float(np.count_nonzero(seen_by)) / len(seen_by)
-    followed.moved = _moved(followed, sensors)
     pedestrians = None
     if followed.returns is not None:
         followed.summary = followed.returns.summary(mounted, returns)
         pedestrians = followed.returns.near_targets(returns)
     show_seen_by(scene, seen_by, pedestrians)
-
-
-def _moved(followed: FollowedSensors, sensors: dict[str, MountedSensor]) -> tuple[str, ...]:
-    solution = followed.state.solution
-    placed = {} if solution is None else {sensor.label: sensor for sensor in solution.deployment.sensors}
-    return tuple(label for label, sensor in sensors.items() if label not in placed or not _same(sensor, placed[label]))
 
 
 def _as_placed(

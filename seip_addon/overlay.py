@@ -84,14 +84,11 @@ class Overlay:
         From the scene to the block that explains the layers; called as the view is drawn, so it only reads.
     labels : callable
         From the scene to the labels that belong to it; called as the view is drawn.
-    about : str
-        What the panel calls it: a sensor's label.
     moving : callable
         To layers that follow the scene; called as the view is drawn.
     """
 
     layers: Sequence[Layer]
     legend: Callable[[bpy.types.Scene], Block | None]
-    about: str = ""
     labels: Callable[[bpy.types.Scene], Sequence[Label]] = lambda _scene: ()
     moving: Callable[[], Sequence[Layer]] = tuple

@@ -10,13 +10,13 @@ import bpy
 PARTS = (
     "panels.preferences",
     "properties.site", "properties.survey", "properties.placement",
-    "properties.traffic", "properties.simulation",
+    "properties.traffic",
     "properties.sections", "properties.scene",
     "session", "scene_survey", "sensor_types", "loose_pieces",
     "viewport.overlays", "viewport.coverage",
     "operators.base", "operators.site", "operators.street_map",
     "operators.sensors", "operators.placement", "live_coverage",
-    "operators.results", "operators.view", "operators.traffic", "operators.simulation", "operators.detection",
+    "operators.results", "operators.view", "operators.traffic", "operators.detection",
     "operators.verification",
     "panels.sensors", "panels.site", "panels.placement", "panels.results", "panels.steps", "panels.front_door",
 )  # fmt: skip

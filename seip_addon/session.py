@@ -184,8 +184,6 @@ class FollowedSensors:
         Share of the targets that some sensor sees.
     summary : ReturnsSummary or None
         Returns of all sensors together.
-    moved : tuple of str
-        Labels of those that are not where the placement put them.
     problem : str
         Why nothing is followed at the moment.
     """
@@ -197,7 +195,6 @@ class FollowedSensors:
     sensors: dict[str, tuple[MountedSensor, Boolean, NDArray[np.float32] | None]] = field(default_factory=dict)
     coverage: float = 0.0
     summary: ReturnsSummary | None = None
-    moved: tuple[str, ...] = ()
     problem: str = ""
 
 

@@ -21,16 +21,14 @@ from ..scene import contract
 from ..scene.blend_file import save_blend
 from ..scene.sensors import labelled_sensors, pose_of
 from .base import Conditional, LongWork, started
+from .traffic import no_sensors
 
-NO_SENSORS = "There is no sensor to detect road users with: place sensors first."
 NO_PYTHON = f"Detection needs a Python with PyTorch, named in the extension's preferences: {INSTALL}."
 
 
 def why_no_detection(scene: bpy.types.Scene) -> str:
     """Return why nothing can be detected; nothing where it can."""
-    if not labelled_sensors(scene):
-        return NO_SENSORS
-    return scene_status.obstacle(scene) or no_python(scene)
+    return no_sensors(scene) or scene_status.obstacle(scene) or no_python(scene)
 
 
 def no_python(_scene: bpy.types.Scene) -> str:

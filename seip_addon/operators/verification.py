@@ -27,13 +27,13 @@ from ..properties.conversion import absolute, output_folder
 from ..scene.changes import watch
 from ..scene.corrections import correct_scene
 from ..scene.read import read_scene
-from ..scene.sensors import labelled_sensors, read_sensors
+from ..scene.sensors import read_sensors
 from ..session import LastVerification, session
 from .base import Conditional, LongWork, ShortWork
 from .detection import folder_of_result
 from .results import no_folder
+from .traffic import no_sensors
 
-NO_SENSORS = "There is no sensor to verify: place sensors first."
 NO_RECORDING = "Name a recording of the installed sensors: a folder of sweeps, or a .pcap."
 NOT_VERIFIED = "Not verified since the file was opened: verify again to add the changes."
 CHANGED = "The scene has changed since: verify again."
@@ -44,11 +44,8 @@ _Verified = tuple[Verification, Mapping[str, bytes]]
 
 def why_no_verification(scene: bpy.types.Scene) -> str:
     """Return why the installation cannot be verified, or ""."""
-    if reason := scene_status.obstacle(scene):
-        return reason
-    if not labelled_sensors(scene):
-        return NO_SENSORS
-    return no_folder(scene) or ("" if scene.seip.verification.recording else NO_RECORDING)
+    reason = scene_status.obstacle(scene) or no_sensors(scene) or no_folder(scene)
+    return reason or ("" if scene.seip.verification.recording else NO_RECORDING)
 
 
 def why_no_correction(scene: bpy.types.Scene) -> str:

@@ -22,7 +22,6 @@ from ..scene.write import coverage_of
 from ..session import SceneState, session
 from ..viewport import coverage, overlays
 from ..viewport.picture import view_pixels
-from ..viewport.point_cloud import NAME as CLOUD
 from ..viewport.sight_lines import NAME as SIGHT
 from ..viewport.sight_lines import sight_overlay
 from .base import Conditional, LongWork, Outcome, attempt
@@ -104,7 +103,7 @@ class SEIP_OT_hide_overlay(bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> Outcome:
         """Hide it; a point cloud is forgotten, as it would be shown again in other colours."""
-        if self.name == CLOUD:
+        if self.name == last_scan.NAME:
             last_scan.hide_cloud(context.scene)
         overlays.hide(context.scene, self.name)
         return {"FINISHED"}

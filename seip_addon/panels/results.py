@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import bpy
 
+from .. import last_scan
 from ..core.choosing.placement.returns_summary import SURFACE_SEEN, returns_text
 from ..core.errors import SeipError
 from ..core.output.pictures.colours import BOTH, CLASS_WORDS, KEPT_ONLY, NEITHER, PRESENT_ONLY, Aspect, compared_shares
@@ -13,9 +14,9 @@ from ..operators import results
 from ..operators.results import no_placement
 from ..operators.view import why_no_coverage
 from ..scene.write import ASPECT, aspects_of, coverage_of
+from ..sensor_edits import sensor_edits
 from ..session import FollowedSensors, session
 from ..viewport import coverage, overlays
-from ..viewport.point_cloud import NAME as CLOUD
 from ..viewport.sight_lines import NAME as SIGHT
 from . import placement
 from .sections import Status, draw_sections
@@ -75,7 +76,7 @@ def _draw_cloud(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     column = layout.column(align=True)
     column.label(text="Point Cloud")
     column.row(align=True).prop(context.scene.seip.view, "cloud_colour", expand=True)
-    column.operator("seip.hide_overlay", icon="X").name = CLOUD
+    column.operator("seip.hide_overlay", icon="X").name = last_scan.NAME
 
 
 SENSOR_SHARE = 0.72
@@ -152,8 +153,8 @@ def _draw_followed(layout: bpy.types.UILayout, following: FollowedSensors) -> No
         draw_sentence(layout, following.problem, icon="ERROR", alert=True)
         return
     layout.label(text=_followed_text(following), icon="HIDE_OFF")
-    if following.moved:
-        draw_sentence(layout, f"Moved by hand: {', '.join(following.moved)}.")
+    if edits := sensor_edits(bpy.context.scene).describe():
+        draw_sentence(layout, edits)
 
 
 def _followed_text(following: FollowedSensors) -> str:

@@ -6,7 +6,7 @@ import bpy
 
 from .. import preferences
 from ..core.sumo_installation import sumo_size
-from ..operators.simulation import SEIP_OT_install_sumo
+from ..operators.traffic import SEIP_OT_install_sumo
 from .sidebar import draw_run
 from .wrapped_text import draw_sentence
 

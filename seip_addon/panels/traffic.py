@@ -12,8 +12,7 @@ from ..core.output.results.detection_record import MAIN_RULE, DetectionRecord, p
 from ..core.workflows.detection import ERRORS
 from ..core.workflows.traffic_runs import traffic_folder
 from ..operators.detection import NO_PYTHON, sensors_key, why_no_detection
-from ..operators.simulation import why_no_simulation
-from ..operators.traffic import why_no_load, why_no_scan
+from ..operators.traffic import why_no_load, why_no_scan, why_no_simulation
 from ..operators.verification import CHANGED as VERIFY_AGAIN
 from ..operators.verification import NO_RECORDING, picture_of, sentences_of, why_no_correction, why_no_verification
 from ..properties.conversion import absolute

@@ -13,10 +13,9 @@ from ..scene_status import FILE_VERSION
 from ..viewport import coverage
 from .conversion import path_property
 from .placement import SEIP_PG_goal
-from .simulation import SEIP_PG_simulation
 from .site import SEIP_PG_site
 from .survey import SEIP_PG_survey
-from .traffic import SEIP_PG_traffic
+from .traffic import SEIP_PG_simulation, SEIP_PG_traffic
 
 
 class SEIP_PG_chosen(bpy.types.PropertyGroup):

@@ -113,12 +113,12 @@ def _legend(_scene: bpy.types.Scene) -> Block | None:
         return None
     rosette = preview.model.rosette is not None
     gap = preview.delta if rosette else 2 * preview.delta
-    before = " in front" if preview.tilt else ""
+    where = f"in front up to {preview.resolved_to():.0f} m" if preview.tilt else f"up to {preview.resolved_to():.0f} m"
     return Block(
-        f"{preview.model.name} at {preview.height:.3g} m",
+        f"{preview.model.name} at {preview.height:.3g} m: no gaps on a level road {where}",
         (
             Entry(f"at most {gap:.3g} m to {'a ray' if rosette else 'the next ring inwards'}", (DENSE,)),
             Entry("more: road between may go unseen", (WIDE,)),
-            Entry(f"no gaps on a level road{before} up to {preview.resolved_to():.0f} m", (CONE,)),
+            Entry("edge of the field of view", (CONE,)),
         ),
     )

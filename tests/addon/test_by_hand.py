@@ -55,7 +55,7 @@ def full_scan(scene: bpy.types.Scene) -> np.ndarray:
     """Return which targets the sensors see as followed sensors do, which go another way through the code."""
     bpy.ops.seip.follow_sensors()
     seen = np.sum([row for _, row, _ in session.following.sensors.values()], axis=0)
-    assert session.following.moved == ()
+    assert not sensor_edits(scene)
     live_coverage.stop()
     return seen
 

@@ -147,7 +147,7 @@ def no_runs(scene, folder):
 @pytest.mark.parametrize(
     ("wrong", "words"),
     [
-        (no_sensors, "There is no sensor to detect road users with: place sensors first"),
+        (no_sensors, "There is no sensor in the scene: place sensors first"),
         (no_runs, r"there is no run of traffic \(\.npz\) in .*runs: choose another folder"),
     ],
 )

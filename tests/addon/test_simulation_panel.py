@@ -10,7 +10,7 @@ from headless import traffic
 import bpy
 import pytest
 
-from seip_addon.operators.simulation import SEIP_OT_simulate_traffic
+from seip_addon.operators.traffic import SEIP_OT_simulate_traffic
 from seip_addon.panels import traffic as traffic_panel
 from seip_addon.session import session
 from tests.builders.drawn_layout import DrawnLayout

@@ -172,7 +172,7 @@ def other_names(scene, folder):
 @pytest.mark.parametrize(
     ("wrong", "words"),
     [
-        (no_sensors, "There is no sensor to verify: place sensors first"),
+        (no_sensors, "There is no sensor in the scene: place sensors first"),
         (no_such_recording, "no such file or folder: .*nowhere"),
         (other_names, "the plan has the sensors S1, S2, but the recording has north"),
     ],
