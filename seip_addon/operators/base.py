@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Callable, Generator
-from typing import Generic, TypeVar
+from contextlib import suppress
+from typing import Any, TypeVar
 
 import bpy
 
@@ -21,6 +22,8 @@ from ..session import RunningWork, scene_of, session
 Result = TypeVar("Result")
 Outcome = set[str]
 Obstacles = tuple[Callable[[bpy.types.Scene], str], ...]
+Job = Generator[Generator[Progress, None, Any], tuple[bpy.types.Scene, Any], None]
+"""See `LongWork.job`."""
 
 REPORT_WIDTH = 72
 """Letters in a line of an error."""
@@ -83,7 +86,7 @@ class ForReadyScene(Conditional):
     obstacles: Obstacles = (scene_status.obstacle,)
 
 
-class ShortWork:
+class ShortWork(Conditional):
     """Mixin for operators that are done at once: an error is reported to the user."""
 
     def act(self, context: bpy.types.Context) -> None:
@@ -95,7 +98,7 @@ class ShortWork:
         return attempt(self, lambda: self.act(context))
 
 
-class LongWork(Generic[Result]):
+class LongWork(Conditional):
     """Mixin for operators with long computations.
 
     From a script, or without a window, `execute` blocks until the result is
@@ -109,22 +112,23 @@ class LongWork(Generic[Result]):
     acceptance: Acceptance | None = None
     """Set by an operator whose search a user can end with the best result so far."""
 
-    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, Result]:
-        """Read the inputs from the scene, on the main thread, and return the work.
+    def job(self, scene: bpy.types.Scene) -> Job:
+        """Read the inputs from a scene, yield the work, and store and report its result; runs on the main thread.
 
         The work runs in a thread: it must touch neither Blender's data nor `session`, only return its result, which
-        is discarded if the work is stopped.
+        is discarded if the work is stopped. ``yield`` returns the scene, in whose place undo may have put another
+        Python object, and the result.
         """
-        raise NotImplementedError
-
-    def conclude(self, scene: bpy.types.Scene, result: Result) -> None:
-        """Store the result in the scene and in `session`, and report it; called on the main thread."""
         raise NotImplementedError
 
     def execute(self, context: bpy.types.Context) -> Outcome:
         """Do the work and wait for it."""
-        scene = context.scene
-        return attempt(self, lambda: self.conclude(scene, finish(self.prepare(scene))))
+
+        def act() -> None:
+            job = self.job(context.scene)
+            _conclude(job, context.scene, finish(next(job)))
+
+        return attempt(self, act)
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event | None) -> Outcome:
         """Start the work in a thread."""
@@ -145,7 +149,7 @@ class LongWork(Generic[Result]):
             self._report(self._running.work.progress)
             return {"PASS_THROUGH"}
         self._end(context)
-        return attempt(self, lambda: self.conclude(scene_of(self._scene), self._running.work.result()))
+        return attempt(self, lambda: _conclude(self._job, scene_of(self._scene), self._running.work.result()))
 
     def cancel(self, context: bpy.types.Context) -> None:
         """Stop because Blender quits, closes the window or opens another file, so that no thread outlives its data."""
@@ -158,7 +162,8 @@ class LongWork(Generic[Result]):
         self._scene = context.scene.session_uid
         # of the class, as panels spell it: Blender gives the instance's as SEIP_OT_…
         name = type(self).bl_idname  # type: ignore[attr-defined]  # of Blender's operators
-        work = Background(self.prepare(context.scene))
+        self._job = self.job(context.scene)
+        work = Background(next(self._job))
         self._running = session.running = RunningWork(name, work, acceptance=self.acceptance)
         self._report = reporter(self._show, SHOW_INTERVAL)
         self._running.timer = context.window_manager.event_timer_add(TIMER_INTERVAL, window=context.window)
@@ -176,6 +181,12 @@ class LongWork(Generic[Result]):
         _stop(self._running)
         _say(context, None)
         _redraw(context)
+
+
+def _conclude(job: Job, scene: bpy.types.Scene, result: object) -> None:
+    """Give a job the result of its work."""
+    with suppress(StopIteration):
+        job.send((scene, result))
 
 
 def _say(context: bpy.types.Context, text: str | None) -> None:

@@ -20,7 +20,7 @@ from ..properties.conversion import absolute, output_folder, runs_folder
 from ..scene import contract
 from ..scene.blend_file import save_blend
 from ..scene.sensors import labelled_sensors, pose_of
-from .base import Conditional, LongWork, started
+from .base import Job, LongWork, started
 from .traffic import no_sensors
 
 NO_PYTHON = f"Detection needs a Python with PyTorch, named in the extension's preferences: {INSTALL}."
@@ -45,7 +45,7 @@ def sensors_key(scene: bpy.types.Scene) -> str:
     return digest(*(part for parts in each for part in parts))
 
 
-class SEIP_OT_detect(Conditional, LongWork[str], bpy.types.Operator):
+class SEIP_OT_detect(LongWork, bpy.types.Operator):
     """Scan runs of traffic with the sensors of the scene and detect road users; runs in a separate Python with PyTorch"""  # noqa: E501  # a tooltip is one line
 
     bl_idname = "seip.detect"
@@ -54,8 +54,8 @@ class SEIP_OT_detect(Conditional, LongWork[str], bpy.types.Operator):
 
     obstacles = (why_no_detection,)
 
-    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, str]:
-        """Save the scene as it is, for the process that detects."""
+    def job(self, scene: bpy.types.Scene) -> Job:
+        """Save the scene as it is for the process that detects, and keep the figures with the scene."""
         request, python = scene.seip.detection, preferences.detecting_python()
         if python is None:
             raise SeipError(NO_PYTHON)
@@ -66,18 +66,15 @@ class SEIP_OT_detect(Conditional, LongWork[str], bpy.types.Operator):
             preferences.catalogue_files(),
             scene.seip.survey.weather(),
         )
-        self._folder = output_folder(request.folder, "the figures")
-        self._sensors = sensors_key(scene)
-        return started(_detected(job, self._folder))
-
-    def conclude(self, scene: bpy.types.Scene, result: str) -> None:
-        """Keep the figures with the scene."""
-        scene.seip.detection.record, scene.seip.detection.sensors = result, self._sensors
+        folder = output_folder(request.folder, "the figures")
+        sensors = sensors_key(scene)
+        scene, result = yield started(_detected(job, folder))
+        scene.seip.detection.record, scene.seip.detection.sensors = result, sensors
         found = parsed_detection(result)
         for sentence in found.warnings:
             self.report({"WARNING"}, sentence)
         precision = found.average_precision[MAIN_RULE]
-        self.report({"INFO"}, f"average precision {precision.average_precision:.1%}; written to {self._folder}")
+        self.report({"INFO"}, f"average precision {precision.average_precision:.1%}; written to {folder}")
 
 
 def _detected(job: DetectionJob, folder: Path) -> Generator[Progress, None, str]:

@@ -26,25 +26,22 @@ from ..properties.conversion import output_folder, runs_folder
 from ..scene.write import write_result
 from ..session import SceneState, scene_of, session
 from ..viewport import coverage, overlays, search
-from .base import Conditional, ForReadyScene, LongWork, Outcome, ShortWork, started
+from .base import ForReadyScene, Job, LongWork, Outcome, ShortWork, started
 from .detection import NO_PYTHON, no_python, saved_scene
 from .results import keep_result
 
 
-class SEIP_OT_compare_scene(ForReadyScene, LongWork[SceneState], bpy.types.Operator):
+class SEIP_OT_compare_scene(ForReadyScene, LongWork, bpy.types.Operator):
     """Check whether the placement still matches the scene"""
 
     bl_idname = "seip.compare_scene"
     bl_label = "Compare with Scene"
     bl_options = {"REGISTER"}  # nothing in the file changes
 
-    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, SceneState]:
-        """Read the scene where it has changed."""
-        return scene_survey.survey(scene)
-
-    def conclude(self, scene: bpy.types.Scene, result: SceneState) -> None:
-        """Hold what was read: the panel compares."""
-        session.of(scene).state = result
+    def job(self, scene: bpy.types.Scene) -> Job:
+        """Read the scene where it has changed: the panel compares."""
+        scene, state = yield scene_survey.survey(scene)
+        session.of(scene).state = state
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +51,7 @@ class _Searching(Progress):
     layout: Layout | None = None
 
 
-class _Placing(LongWork[SceneState]):
+class _Placing(LongWork):
     """A mixin: work that ends with a placement; the best so far is drawn while it is searched."""
 
     _drawn: tuple[int, ...] = ()
@@ -71,11 +68,11 @@ class _Placing(LongWork[SceneState]):
             overlays.hide(scene, search.NAME)
         super()._end(context)
 
-    def conclude(self, scene: bpy.types.Scene, result: SceneState) -> None:
+    def _store(self, scene: bpy.types.Scene, state: SceneState) -> None:
         """Put the sensors into the scene, and all that is needed to go on later into the file."""
-        survey, solution = result.placed()
+        survey, solution = state.placed()
         write_result(scene, survey.site, solution.deployment)
-        record = keep_result(scene, result)
+        record = keep_result(scene, state)
         coverage.show_colours(scene)
         self.report({"INFO"}, " ".join(answer(record)[:2]))  # type: ignore[attr-defined]  # of Blender's operators
 
@@ -86,16 +83,16 @@ class SEIP_OT_solve_placement(ForReadyScene, _Placing, bpy.types.Operator):
     bl_idname = "seip.solve_placement"
     bl_label = "Place Sensors"
 
-    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, SceneState]:
-        """Read the scene where it has changed, and state the objective."""
+    def job(self, scene: bpy.types.Scene) -> Job:
+        """Read the scene where it has changed, state the objective, and place sensors."""
         goal = scene.seip.goal
         objective = goal.objective()
         folder = runs_folder(goal.runs) if objective.scenarios.kind == "traffic" else None
         self.acceptance = Acceptance()
-        return _placed(scene_survey.survey(scene), objective, folder, self.acceptance)
+        self._store(*(yield _placed(scene_survey.survey(scene), objective, folder, self.acceptance)))
 
 
-class SEIP_OT_judge_placement(Conditional, _Placing, bpy.types.Operator):
+class SEIP_OT_judge_placement(_Placing, bpy.types.Operator):
     """Place sensors, and choose among twelve good placements by what a detector finds with them in runs of traffic; runs in a separate Python with PyTorch"""  # noqa: E501  # a tooltip is one line
 
     bl_idname = "seip.judge_placement"
@@ -103,8 +100,8 @@ class SEIP_OT_judge_placement(Conditional, _Placing, bpy.types.Operator):
 
     obstacles = (scene_status.obstacle, no_python)
 
-    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, SceneState]:
-        """Read the scene where it has changed, save it for the process that judges, and state the objective."""
+    def job(self, scene: bpy.types.Scene) -> Job:
+        """Read the scene where it has changed, save it for the process that judges, and place sensors."""
         seip, python = scene.seip, preferences.detecting_python()
         if python is None:
             raise SeipError(NO_PYTHON)
@@ -114,7 +111,8 @@ class SEIP_OT_judge_placement(Conditional, _Placing, bpy.types.Operator):
         job = DetectionJob(python, runs, None, preferences.catalogue_files(), seip.survey.weather())
         folder = output_folder(seip.detection.folder, "the detections")
         self.acceptance = Acceptance()
-        return started(_judged(scene_survey.survey(scene), objective, job, folder, self.acceptance))
+        steps = _judged(scene_survey.survey(scene), objective, job, folder, self.acceptance)
+        self._store(*(yield started(steps)))
 
 
 def _judged(

@@ -40,15 +40,12 @@ from ..scene.sensors import labelled_sensors, placed_sensors, read_sensors
 from ..scene.write import coverage_of, shown_legend, take_over
 from ..sensor_edits import position_names, sensor_edits
 from ..session import SceneState, session
-from .base import ForReadyScene, LongWork, Obstacles, Outcome, Result, ShortWork, started
+from .base import ForReadyScene, Job, LongWork, Obstacles, Outcome, ShortWork, started
 
 OTHER_TARGETS = "The two placements were made on different targets: only their figures can be compared."
 PLAN = "plan.png"
 EYE_DISTANCE = 10.0
 """Metres from a sensor's eye to the point that the view turns about."""
-
-
-_Following = tuple[SceneState, VisibilityModel, SensorReturns | None]  # what following sensors needs
 
 
 def no_placement(scene: bpy.types.Scene) -> str:
@@ -213,7 +210,7 @@ class SEIP_OT_show_comparison(ForPlacement, ShortWork, bpy.types.Operator):
         self.report({"INFO"}, f"{kept.name} and the present placement: {shares} of the road")
 
 
-class SEIP_OT_follow_sensors(ForPlacement, LongWork[_Following], bpy.types.Operator):
+class SEIP_OT_follow_sensors(ForPlacement, LongWork, bpy.types.Operator):
     """Toggle live coverage while sensors are moved or turned by hand"""
 
     bl_idname = "seip.follow_sensors"
@@ -231,18 +228,17 @@ class SEIP_OT_follow_sensors(ForPlacement, LongWork[_Following], bpy.types.Opera
             return {"FINISHED"}
         return super().execute(context)
 
-    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, _Following]:
-        """Return the job that restores the placement."""
-        return _set_up(scene_survey.with_placement(scene))
-
-    def conclude(self, scene: bpy.types.Scene, result: _Following) -> None:
-        """Begin to follow."""
-        state, model, returns = result
+    def job(self, scene: bpy.types.Scene) -> Job:
+        """Restore the placement, and begin to follow."""
+        scene, (state, model, returns) = yield _set_up(scene_survey.with_placement(scene))
         session.of(scene).state = state
         live_coverage.start(scene, state, model, returns)
 
 
-def _set_up(finding: Generator[Progress, None, SceneState]) -> Generator[Progress, None, _Following]:
+def _set_up(
+    finding: Generator[Progress, None, SceneState],
+) -> Generator[Progress, None, tuple[SceneState, VisibilityModel, SensorReturns | None]]:
+    """Return what following sensors needs."""
     state = yield from finding
     settings = state.layout.settings
     yield Progress(0, 0, "getting ready to cast")
@@ -252,7 +248,7 @@ def _set_up(finding: Generator[Progress, None, SceneState]) -> Generator[Progres
     return state, visibility, SensorReturns(state.layout, solution.objective) if of_returns else None
 
 
-class SEIP_OT_evaluate_sensors(ForReadyScene, LongWork[SceneState], bpy.types.Operator):
+class SEIP_OT_evaluate_sensors(ForReadyScene, LongWork, bpy.types.Operator):
     """Evaluate the sensors of the scene at their present poses, and make them the placement"""
 
     bl_idname = "seip.evaluate_sensors"
@@ -263,19 +259,16 @@ class SEIP_OT_evaluate_sensors(ForReadyScene, LongWork[SceneState], bpy.types.Op
         lambda scene: "" if scene_status.has_unevaluated(scene) else no_placement(scene),
     )
 
-    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, SceneState]:
-        """Read the poses of the sensors; those without a placement are evaluated under the goal of the panel."""
+    def job(self, scene: bpy.types.Scene) -> Job:
+        """Evaluate the sensors; those without a placement are evaluated under the goal of the panel."""
         mounted = read_sensors(scene, preferences.catalogue(), hidden=True)
         text, names = scene.seip.result.record, position_names(scene)
         record = parsed_record(text) if text else None
         objective = scene.seip.goal.objective() if record is None else record.request.goal
-        return _evaluated(scene_survey.survey(scene), record, objective, mounted, names)
-
-    def conclude(self, scene: bpy.types.Scene, result: SceneState) -> None:
-        """Make the sensors at their present poses the placement."""
-        survey, solution = result.placed()
+        scene, state = yield _evaluated(scene_survey.survey(scene), record, objective, mounted, names)
+        survey, solution = state.placed()
         take_over(scene, survey.site, solution.deployment, labelled_sensors(scene, hidden=True))
-        self.report({"INFO"}, answer(keep_result(scene, result))[0])
+        self.report({"INFO"}, answer(keep_result(scene, state))[0])
 
 
 def _evaluated(
@@ -307,7 +300,7 @@ def keep_result(scene: bpy.types.Scene, state: SceneState) -> PlacementRecord:
     return record
 
 
-class _Writes(ForPlacement, LongWork[Result]):
+class _Writes(ForPlacement, LongWork):
     """Mixin for operators that write the placement into the folder of the result."""
 
     obstacles = (*ForPlacement.obstacles, no_folder, not_evaluated)
@@ -320,23 +313,20 @@ def _checked_folder(scene: bpy.types.Scene) -> Path:
     return folder
 
 
-class SEIP_OT_export_result(_Writes[SceneState], bpy.types.Operator):
+class SEIP_OT_export_result(_Writes, bpy.types.Operator):
     """Write tables, pictures and the scene with its sensors to the folder, replacing earlier ones"""
 
     bl_idname = "seip.export_result"
     bl_label = "Export"
     stopped_message = "stopped; nothing was written"
 
-    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, SceneState]:
-        """Save the scene as it is, and find the placement again."""
-        self._folder = _checked_folder(scene)
-        return started(_exported(self._folder, scene))
-
-    def conclude(self, scene: bpy.types.Scene, result: SceneState) -> None:
-        """Report where the files are."""
-        session.of(scene).state = result
-        session.of(scene).exported = result.record, {"Plan": self._folder / PLAN}
-        self.report({"INFO"}, f"written to {self._folder}")
+    def job(self, scene: bpy.types.Scene) -> Job:
+        """Save the scene as it is, find the placement again and write it, and report where the files are."""
+        folder = _checked_folder(scene)
+        scene, state = yield started(_exported(folder, scene))
+        session.of(scene).state = state
+        session.of(scene).exported = state.record, {"Plan": folder / PLAN}
+        self.report({"INFO"}, f"written to {folder}")
 
 
 def _exported(folder: Path, scene: bpy.types.Scene) -> Generator[Progress, None, SceneState]:
@@ -366,23 +356,19 @@ def _exported(folder: Path, scene: bpy.types.Scene) -> Generator[Progress, None,
     return state
 
 
-class SEIP_OT_write_report(_Writes[tuple[SceneState, tuple[Path, ...]]], bpy.types.Operator):
+class SEIP_OT_write_report(_Writes, bpy.types.Operator):
     """Write a report on the placement to the folder, as HTML and PDF; export the placement first if needed"""
 
     bl_idname = "seip.write_report"
     bl_label = "Write Report"
     stopped_message = "stopped; no report was written"
 
-    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, tuple[SceneState, tuple[Path, ...]]]:
-        """Return the work: the export where the folder holds another result, and the report."""
+    def job(self, scene: bpy.types.Scene) -> Job:
+        """Export unless the folder holds this result, write the report, and say where the files are."""
         folder = _checked_folder(scene)
-        if exported_files(scene).get("Plan") == folder / PLAN:
-            return _reported(folder, scene_survey.with_placement(scene))
-        return started(_reported(folder, _exported(folder, scene)))
-
-    def conclude(self, scene: bpy.types.Scene, result: tuple[SceneState, tuple[Path, ...]]) -> None:
-        """Report where the files are."""
-        state, written = result
+        is_exported = exported_files(scene).get("Plan") == folder / PLAN
+        exporting = scene_survey.with_placement(scene) if is_exported else started(_exported(folder, scene))
+        scene, (state, written) = yield _reported(folder, exporting)
         session.of(scene).state = state
         files = {"Plan": written[0].with_name(PLAN), "Report": written[0]}
         session.of(scene).exported = state.record, files

@@ -13,14 +13,14 @@ from ..core.errors import SeipError
 from ..core.sensing.lidar.catalogue import load_catalogue
 from ..session import session
 from ..viewport import beam_preview, overlays
-from .base import Conditional, Outcome, ShortWork
+from .base import Outcome, ShortWork
 
 
 def _no_preferences(_scene: bpy.types.Scene) -> str:
     return "Install the add-on as an extension: only then it has preferences" if preferences.own() is None else ""
 
 
-class SEIP_OT_add_catalogue(Conditional, ShortWork, bpy.types.Operator):
+class SEIP_OT_add_catalogue(ShortWork, bpy.types.Operator):
     """Add a catalogue of your own, which docs/sensors.md describes"""
 
     bl_idname = "seip.add_catalogue"
@@ -51,7 +51,7 @@ class SEIP_OT_add_catalogue(Conditional, ShortWork, bpy.types.Operator):
         self.report({"INFO"}, f"{path.name}: {changed} sensor types added or replaced")
 
 
-class SEIP_OT_remove_catalogue(Conditional, ShortWork, bpy.types.Operator):
+class SEIP_OT_remove_catalogue(ShortWork, bpy.types.Operator):
     """Remove a catalogue of your own from the list; the file stays"""
 
     bl_idname = "seip.remove_catalogue"
@@ -70,7 +70,7 @@ class SEIP_OT_remove_catalogue(Conditional, ShortWork, bpy.types.Operator):
         sensor_types.refresh()
 
 
-class SEIP_OT_empty_cache(Conditional, ShortWork, bpy.types.Operator):
+class SEIP_OT_empty_cache(ShortWork, bpy.types.Operator):
     """Delete all stored visibility grids; they are computed again when needed"""
 
     bl_idname = "seip.empty_cache"

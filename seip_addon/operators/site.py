@@ -34,7 +34,7 @@ from ..scene.startup import remove_startup_objects
 from ..scene.views import frame_site
 from ..session import CheckedScene, session
 from ..viewport import overlays
-from .base import Conditional, LongWork, Obstacles, Outcome, ShortWork
+from .base import Conditional, Job, LongWork, Obstacles, Outcome, ShortWork
 
 EXAMPLE = Path(__file__).resolve().parents[2] / "scenes" / f"junction{DESCRIPTION_SUFFIX}"
 """The site that comes with SEIP: beside the package, in a checkout as in the extension."""
@@ -53,7 +53,7 @@ class _WritesScene(Conditional):
     obstacles: Obstacles = (scene_status.not_own,)
 
 
-class SEIP_OT_choose_map(_WritesScene, LongWork[SitePlaces], bpy.types.Operator):
+class SEIP_OT_choose_map(_WritesScene, LongWork, bpy.types.Operator):
     """Choose an OpenDRIVE map (.xodr), an extract of OpenStreetMap (.osm, .osm.gz, .osm.pbf) or a site description (.toml), and choose among its junctions"""  # noqa: E501  # a tooltip is one line
 
     bl_idname = "seip.choose_map"
@@ -82,17 +82,14 @@ class SEIP_OT_choose_map(_WritesScene, LongWork[SitePlaces], bpy.types.Operator)
         """List the file's junctions: in a thread where the file browser asks, at once where a script does."""
         return super().invoke(context, None) if self.by_hand and not bpy.app.background else super().execute(context)
 
-    def prepare(self, _scene: bpy.types.Scene) -> Generator[Progress, None, SitePlaces]:
-        """Return the reading of the file."""
-        return site_places(Path(bpy.path.abspath(self.filepath)))
-
-    def conclude(self, scene: bpy.types.Scene, result: SitePlaces) -> None:
-        """List the junctions in place of those of another file, and ask for the place."""
+    def job(self, scene: bpy.types.Scene) -> Job:
+        """Read the file, list its junctions in place of those of another file, and ask for the place."""
+        scene, found = yield site_places(Path(bpy.path.abspath(self.filepath)))
         site = scene.seip.site
-        _list_places(site, self.filepath, result)
+        _list_places(site, self.filepath, found)
         self.report({"INFO"}, counted(len(site.junctions), "junction"))
         if self.by_hand and not bpy.app.background:
-            self._ask(site, result)
+            self._ask(site, found)
 
     def _ask(self, site: SEIP_PG_site, found: SitePlaces) -> None:
         """Ask for the place: on the map, or in a dialog where a description or the only junction gives it."""
@@ -120,7 +117,7 @@ def _list_places(site: SEIP_PG_site, source: str, places: SitePlaces) -> None:
     session.places = places
 
 
-class SEIP_OT_download_map(_WritesScene, LongWork[tuple[Path, SitePlaces]], bpy.types.Operator):
+class SEIP_OT_download_map(_WritesScene, LongWork, bpy.types.Operator):
     """Download the streets, buildings and trees around the place from OpenStreetMap, and choose the place there. A download of the same day is used again"""  # noqa: E501  # a tooltip is one line
 
     bl_idname = "seip.download_map"
@@ -133,17 +130,13 @@ class SEIP_OT_download_map(_WritesScene, LongWork[tuple[Path, SitePlaces]], bpy.
         lambda _: preferences.why_no_download(),
     )
 
-    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, tuple[Path, SitePlaces]]:
-        """Take the position, for a site of the usual size: a larger one downloads more when it is built."""
-        self._near = parsed_position(scene.seip.site.new_site)
-        return _downloaded(SiteRequest(near_latlon=self._near, overpass=preferences.overpass()))
-
-    def conclude(self, scene: bpy.types.Scene, result: tuple[Path, SitePlaces]) -> None:
-        """List the junctions, and choose the position."""
-        path, places = result
+    def job(self, scene: bpy.types.Scene) -> Job:
+        """Download a site of the usual size, and list its junctions; a larger site downloads more when it is built."""
+        near = parsed_position(scene.seip.site.new_site)
+        scene, (path, places) = yield _downloaded(SiteRequest(near_latlon=near, overpass=preferences.overpass()))
         site = scene.seip.site
         _list_places(site, str(path), places)
-        site.junction, site.position = "", "{:.6f}, {:.6f}".format(*self._near)
+        site.junction, site.position = "", "{:.6f}, {:.6f}".format(*near)
         self.report({"INFO"}, counted(len(site.junctions), "junction"))
 
 
@@ -169,12 +162,12 @@ def missing_for_build(scene: bpy.types.Scene) -> str:
     return ""
 
 
-class _BuildsSite(_WritesScene, LongWork[BuiltSite]):
+class _BuildsSite(_WritesScene, LongWork):
     """A mixin for operators that build a site."""
 
     is_chosen = True
 
-    def conclude(self, scene: bpy.types.Scene, result: BuiltSite) -> None:
+    def _build(self, scene: bpy.types.Scene, result: BuiltSite) -> None:
         """Build the scene."""
         report = self.report  # type: ignore[attr-defined]  # of Blender's operators
         built = self._emptied(scene, result.model.name)
@@ -217,10 +210,10 @@ class SEIP_OT_build_site(_BuildsSite, bpy.types.Operator):
 
     obstacles = (missing_for_build, *_WritesScene.obstacles)
 
-    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, BuiltSite]:
-        """Take what was chosen."""
+    def job(self, scene: bpy.types.Scene) -> Job:
+        """Build what was chosen."""
         site = scene.seip.site
-        return build_site(Path(bpy.path.abspath(site.source)), site.request())
+        self._build(*(yield build_site(Path(bpy.path.abspath(site.source)), site.request())))
 
 
 class SEIP_OT_load_example(_BuildsSite, bpy.types.Operator):
@@ -230,9 +223,9 @@ class SEIP_OT_load_example(_BuildsSite, bpy.types.Operator):
     bl_label = "Load Example"
     is_chosen = False
 
-    def prepare(self, _scene: bpy.types.Scene) -> Generator[Progress, None, BuiltSite]:
-        """Take the example's description, which says all."""
-        return build_site(EXAMPLE, SiteRequest())
+    def job(self, _scene: bpy.types.Scene) -> Job:
+        """Build the example, whose description says all."""
+        self._build(*(yield build_site(EXAMPLE, SiteRequest())))
 
 
 def _copy_choice(chosen: SEIP_PG_site, site: SEIP_PG_site) -> None:
@@ -346,28 +339,25 @@ class SEIP_OT_add_area(_InObjectMode, bpy.types.Operator):
         return {"FINISHED"}
 
 
-class SEIP_OT_check_site(LongWork[SiteCheck], bpy.types.Operator):
+class SEIP_OT_check_site(LongWork, bpy.types.Operator):
     """Count the objects by role, and list problems that prevent a placement or make it wrong"""
 
     bl_idname = "seip.check_site"
     bl_label = "Check Site"
 
-    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, SiteCheck]:
-        """Read the scene as it is now."""
-        self._watch, self._settings = watch(scene), scene_status.checked_settings(scene)
+    def job(self, scene: bpy.types.Scene) -> Job:
+        """Check the scene as it is now, and hold what was found."""
+        watching, of = watch(scene), scene_status.checked_settings(scene)
         contents = contents_of(scene)
         settings: SurveySettings | SeipError
         try:
             settings = scene.seip.survey.settings()
         except SeipError as error:
             settings = error
-        return _checked(contents, settings)
-
-    def conclude(self, scene: bpy.types.Scene, result: SiteCheck) -> None:
-        """Hold what was found."""
-        session.of(scene).check = CheckedScene(result, self._watch, self._settings)
+        scene, found = yield _checked(contents, settings)
+        session.of(scene).check = CheckedScene(found, watching, of)
         bpy.context.window_manager.seip_sections.follow_steps()
-        self.report({"INFO"}, in_short(result.problems))
+        self.report({"INFO"}, in_short(found.problems))
 
 
 def _checked(contents: SceneContents, settings: SurveySettings | SeipError) -> Generator[Progress, None, SiteCheck]:

@@ -17,10 +17,9 @@ from ..core.progress import Progress, finish
 from ..core.sensing.scans.run_folder import Record, Run, check_run_folder
 from ..core.sensing.scans.sensor import MountedSensor
 from ..core.sensing.traffic.source import TrafficFiles, describe_categories, load_traffic
-from ..core.sensing.traffic.trajectories import LoadedTraffic, Trajectories
+from ..core.sensing.traffic.trajectories import Trajectories
 from ..core.site.scene_geometry import SceneGeometry
 from ..core.sumo_installation import install_sumo
-from ..core.sumo_programs import Sumo
 from ..core.workflows.recording import RecordingSettings, make_run, record, simulation_of
 from ..core.workflows.traffic_simulation import SimulatedRuns, simulate_runs
 from ..properties.conversion import output_folder
@@ -29,7 +28,7 @@ from ..scene.read import read_scene
 from ..scene.sensors import labelled_sensors, read_sensors
 from ..scene.traffic import animate, clear_traffic, read_traffic
 from ..session import LastScan, SceneTraffic, session
-from .base import Conditional, LongWork, Outcome
+from .base import Conditional, Job, LongWork, Outcome
 
 NO_FILE = "There is no traffic file: name one, or animate objects of your own in SEIP Traffic."
 NO_TRAFFIC = "There is nothing to scan: name a traffic file, or animate objects in SEIP Traffic."
@@ -57,7 +56,7 @@ def why_no_scan(scene: bpy.types.Scene) -> str:
     return "" if there else NO_TRAFFIC
 
 
-class SEIP_OT_load_traffic(Conditional, LongWork[LoadedTraffic], bpy.types.Operator):
+class SEIP_OT_load_traffic(LongWork, bpy.types.Operator):
     """Read the traffic file and animate its road users on the road"""
 
     bl_idname = "seip.load_traffic"
@@ -65,15 +64,12 @@ class SEIP_OT_load_traffic(Conditional, LongWork[LoadedTraffic], bpy.types.Opera
 
     obstacles = (why_no_load,)
 
-    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, LoadedTraffic]:
-        """Read the scene that the traffic is to stand on."""
-        self._files = scene.seip.traffic.files()
-        self._changed = last_scan.changes(self._files)
-        return load_traffic(self._files, read_scene(scene).geometry)
-
-    def conclude(self, scene: bpy.types.Scene, result: LoadedTraffic) -> None:
-        """Animate the road users."""
-        show_traffic(scene, SceneTraffic(self._files, self._changed, result.trajectories), result.warnings)
+    def job(self, scene: bpy.types.Scene) -> Job:
+        """Read the traffic onto the scene, and animate its road users."""
+        files = scene.seip.traffic.files()
+        changed = last_scan.changes(files)
+        scene, result = yield load_traffic(files, read_scene(scene).geometry)
+        show_traffic(scene, SceneTraffic(files, changed, result.trajectories), result.warnings)
         for sentence in result.warnings:
             self.report({"WARNING"}, sentence)
         self.report({"INFO"}, f"{counted(len(result.trajectories), 'road user')}; press play")
@@ -106,7 +102,7 @@ class SEIP_OT_clear_traffic(Conditional, bpy.types.Operator):
         return {"FINISHED"}
 
 
-class SEIP_OT_scan_frame(Conditional, LongWork[LastScan], bpy.types.Operator):
+class SEIP_OT_scan_frame(LongWork, bpy.types.Operator):
     """Show the point cloud of the placed sensors at the current frame"""
 
     bl_idname = "seip.scan_frame"
@@ -114,14 +110,11 @@ class SEIP_OT_scan_frame(Conditional, LongWork[LastScan], bpy.types.Operator):
     bl_label = "Scan This Frame"
     bl_options = {"REGISTER"}  # nothing in the file changes
 
-    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, LastScan]:
-        """Read what is scanned."""
-        self._scene_read = _SceneRead(scene)
-        return _scanned(self._scene_read, last_scan.now(scene), session.of(scene).scan)
-
-    def conclude(self, scene: bpy.types.Scene, result: LastScan) -> None:
-        """Show the points."""
-        self._scene_read.keep_traffic(scene)
+    def job(self, scene: bpy.types.Scene) -> Job:
+        """Scan the scene as it is, and show the points."""
+        read = _SceneRead(scene)
+        scene, result = yield _scanned(read, last_scan.now(scene), session.of(scene).scan)
+        read.keep_traffic(scene)
         last_scan.keep(scene, result)
         for sentence in result.simulation.warnings:
             self.report({"WARNING"}, sentence)
@@ -138,7 +131,7 @@ def _scanned(read: _SceneRead, at: float, before: LastScan | None) -> Generator[
     return last_scan.measure(run, simulation, at)
 
 
-class SEIP_OT_write_dataset(Conditional, LongWork[tuple[Record, tuple[str, ...]]], bpy.types.Operator):
+class SEIP_OT_write_dataset(LongWork, bpy.types.Operator):
     """Scan all frames and write them with the boxes of all road users, as datasets for training detectors"""
 
     bl_idname = "seip.write_dataset"
@@ -147,19 +140,15 @@ class SEIP_OT_write_dataset(Conditional, LongWork[tuple[Record, tuple[str, ...]]
     bl_options = {"REGISTER"}  # as above
     stopped_message = "stopped; what is written stays, and the same run goes on from there"
 
-    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, tuple[Record, tuple[str, ...]]]:
-        """Read what is recorded."""
-        self._scene_read = _SceneRead(scene)
-        self._folder = output_folder(scene.seip.traffic.folder, "the scans")
-        return _recorded(self._scene_read, self._folder)
-
-    def conclude(self, scene: bpy.types.Scene, result: tuple[Record, tuple[str, ...]]) -> None:
-        """Say what was written."""
-        self._scene_read.keep_traffic(scene)
-        written, warnings = result
+    def job(self, scene: bpy.types.Scene) -> Job:
+        """Record the scene as it is, and say what was written."""
+        read = _SceneRead(scene)
+        folder = output_folder(scene.seip.traffic.folder, "the scans")
+        scene, (written, warnings) = yield _recorded(read, folder)
+        read.keep_traffic(scene)
         for sentence in warnings:
             self.report({"WARNING"}, sentence)
-        self.report({"INFO"}, f"{counted(len(written['frames']), 'frame')} in {self._folder}")
+        self.report({"INFO"}, f"{counted(len(written['frames']), 'frame')} in {folder}")
 
 
 def _recorded(read: _SceneRead, folder: Path) -> Generator[Progress, None, tuple[Record, tuple[str, ...]]]:
@@ -204,7 +193,7 @@ def _facts(trajectories: Trajectories) -> list[str]:
     return [f"{counted(len(trajectories), 'road user')}, {begin:g} to {end:g} s", describe_categories(trajectories)]
 
 
-class SEIP_OT_install_sumo(Conditional, LongWork[Sumo], bpy.types.Operator):
+class SEIP_OT_install_sumo(LongWork, bpy.types.Operator):
     """Download Eclipse SUMO from PyPI into the extension's own folder, where it takes up to 470 MB. It lays out the streets of an extract of OpenStreetMap and simulates traffic"""  # noqa: E501  # a tooltip is one line
 
     bl_idname = "seip.install_sumo"
@@ -220,15 +209,9 @@ class SEIP_OT_install_sumo(Conditional, LongWork[Sumo], bpy.types.Operator):
         with context.temp_override(window=main):
             return super().invoke(context, event)
 
-    def prepare(self, _scene: bpy.types.Scene) -> Generator[Progress, None, Sumo]:
-        """Take pip and the folder."""
-        reason = preferences.why_no_installation()
-        if reason:
-            raise SeipError(reason)
-        return install_sumo(preferences.pip(), preferences.own_sumo_folder())
-
-    def conclude(self, _scene: bpy.types.Scene, _result: Sumo) -> None:
-        """Report what is there now."""
+    def job(self, _scene: bpy.types.Scene) -> Job:
+        """Install it, and report what is there now."""
+        yield install_sumo(preferences.pip(), preferences.own_sumo_folder())
         self.report({"INFO"}, preferences.sumo_status()[0])
 
 
@@ -242,7 +225,7 @@ def why_no_simulation(scene: bpy.types.Scene) -> str:
     return "" if scene.seip.simulation.street_map() is not None else NO_MAP
 
 
-class SEIP_OT_simulate_traffic(Conditional, LongWork[SimulatedRuns], bpy.types.Operator):
+class SEIP_OT_simulate_traffic(LongWork, bpy.types.Operator):
     """Simulate runs of traffic on the map of the site with SUMO, put the first on the road, and use all for Detection and for placements in traffic"""  # noqa: E501  # a tooltip is one line
 
     bl_idname = "seip.simulate_traffic"
@@ -251,26 +234,25 @@ class SEIP_OT_simulate_traffic(Conditional, LongWork[SimulatedRuns], bpy.types.O
 
     obstacles = (why_no_simulation,)
 
-    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, SimulatedRuns]:
-        """Read the road and the map."""
+    def job(self, scene: bpy.types.Scene) -> Job:
+        """Simulate on the road and the map, show the first run, and name the folder where runs are asked for."""
         request = scene.seip.simulation
         found = request.street_map()
         if found is None:
             raise SeipError(NO_MAP)
-        self._named, self._key = request.folder, request.key()
+        named, key = request.folder, request.key()
         geometry = read_scene(scene).geometry
         more = (request.settings(), request.count, geometry, output_folder(request.folder, "the runs of traffic"))
         if isinstance(found, Path):
-            return simulate_runs(found, *more, preferences.sumo_folders())
-        return _simulated_on_text(found.name, found.as_string(), *more, preferences.sumo_folders())
-
-    def conclude(self, scene: bpy.types.Scene, result: SimulatedRuns) -> None:
-        """Put the first run on the road, and name the folder where runs are asked for."""
+            steps = simulate_runs(found, *more, preferences.sumo_folders())
+        else:
+            steps = _simulated_on_text(found.name, found.as_string(), *more, preferences.sumo_folders())
+        scene, result = yield steps
         seip = scene.seip
         first = str(result.paths[0])
-        seip.traffic.file = bpy.path.relpath(first) if self._named.startswith("//") else first
-        seip.detection.runs = seip.goal.runs = self._named
-        seip.simulation.facts, seip.simulation.made_with = result.summary, self._key
+        seip.traffic.file = bpy.path.relpath(first) if named.startswith("//") else first
+        seip.detection.runs = seip.goal.runs = named
+        seip.simulation.facts, seip.simulation.made_with = result.summary, key
         files = TrafficFiles(result.paths[0])
         show_traffic(scene, SceneTraffic(files, last_scan.changes(files), result.first), result.warnings[0])
         for sentence in result.messages:

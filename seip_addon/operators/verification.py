@@ -29,7 +29,7 @@ from ..scene.corrections import correct_scene
 from ..scene.read import read_scene
 from ..scene.sensors import read_sensors
 from ..session import LastVerification, session
-from .base import Conditional, LongWork, ShortWork
+from .base import Job, LongWork, ShortWork
 from .detection import folder_of_result
 from .results import no_folder
 from .traffic import no_sensors
@@ -38,8 +38,6 @@ NO_RECORDING = "Name a recording of the installed sensors: a folder of sweeps, o
 NOT_VERIFIED = "Not verified since the file was opened: verify again to add the changes."
 CHANGED = "The scene has changed since: verify again."
 CHANGES = VERIFICATION_PICTURES[0]
-_Verified = tuple[Verification, Mapping[str, bytes]]
-"""A verification with the content of its files."""
 
 
 def why_no_verification(scene: bpy.types.Scene) -> str:
@@ -71,7 +69,7 @@ def _folder_of(scene: bpy.types.Scene) -> Path:
     return output_folder(scene.seip.result.folder, "the verification") / VERIFICATION_FOLDER
 
 
-class SEIP_OT_verify(Conditional, LongWork[_Verified], bpy.types.Operator):
+class SEIP_OT_verify(LongWork, bpy.types.Operator):
     """Compare the installed sensors with the plan by a recording: poses, changes and coverage"""
 
     bl_idname = "seip.verify"
@@ -81,11 +79,10 @@ class SEIP_OT_verify(Conditional, LongWork[_Verified], bpy.types.Operator):
 
     obstacles = (why_no_verification,)
 
-    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, _Verified]:
-        """Read the scene and its sensors, and open the recording."""
+    def job(self, scene: bpy.types.Scene) -> Job:
+        """Compare the scene and its sensors with the recording, write the files, and keep what was found."""
         settings = scene.seip.survey.settings()
-        self._folder = _folder_of(scene)
-        self._watch = watch(scene)
+        folder, watching = _folder_of(scene), watch(scene)
         geometry = settings.weather.over(read_scene(scene).geometry)
         sensors = tuple(
             replace(one, model=settings.weather.through(one.model))
@@ -94,20 +91,16 @@ class SEIP_OT_verify(Conditional, LongWork[_Verified], bpy.types.Operator):
         recording = open_recording(
             absolute(scene.seip.verification.recording), min(one.model.rotation_rate for one in sensors)
         )
-        return _verified(self._folder, geometry, sensors, recording, settings)
-
-    def conclude(self, scene: bpy.types.Scene, result: _Verified) -> None:
-        """Write the files, keep what was found, and report it."""
-        check_folder(self._folder)
-        found, files = result
+        scene, (found, files) = yield _verified(folder, geometry, sensors, recording, settings)
+        check_folder(folder)
         for name, content in files.items():
-            with whole_file(self._folder / name) as temporary:
+            with whole_file(folder / name) as temporary:
                 temporary.write_bytes(content)
         scene.seip.verification.found = "\n".join(summary(record_of(scene.name, "", found)))
-        session.of(scene).verification = LastVerification(found, self._watch)
+        session.of(scene).verification = LastVerification(found, watching)
         for sentence in found.warnings:
             self.report({"WARNING"}, sentence)
-        self.report({"INFO"}, f"verified; written to {self._folder}")
+        self.report({"INFO"}, f"verified; written to {folder}")
 
 
 def _verified(
@@ -116,7 +109,8 @@ def _verified(
     sensors: tuple[MountedSensor, ...],
     recording: Recording,
     settings: SurveySettings,
-) -> Generator[Progress, None, _Verified]:
+) -> Generator[Progress, None, tuple[Verification, Mapping[str, bytes]]]:
+    """Return the verification with the content of its files."""
     with folder_of_result(folder), TemporaryDirectory(prefix="seip-") as raw:
         found = yield from verify(
             geometry, sensors, recording, settings.visibility, spacing=settings.grid_spacing, engine=settings.engine
@@ -127,7 +121,7 @@ def _verified(
         return found, {path.name: path.read_bytes() for path in sorted(Path(raw).iterdir())}
 
 
-class SEIP_OT_correct_scene(Conditional, ShortWork, bpy.types.Operator):
+class SEIP_OT_correct_scene(ShortWork, bpy.types.Operator):
     """Add new objects as boxes, remove those that are gone, and move the sensors to their installed poses"""
 
     bl_idname = "seip.correct_scene"

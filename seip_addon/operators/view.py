@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator
 from itertools import chain, count
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -13,7 +12,6 @@ from numpy.typing import NDArray
 
 from .. import last_scan, scene_survey
 from ..core.errors import SeipError
-from ..core.progress import Progress
 from ..core.sensing.visibility.sight_lines import pose_at, sight_lines
 from ..scene import contract
 from ..scene.coverage_colours import colour_coverage
@@ -24,7 +22,7 @@ from ..viewport import coverage, overlays
 from ..viewport.picture import view_pixels
 from ..viewport.sight_lines import NAME as SIGHT
 from ..viewport.sight_lines import sight_overlay
-from .base import Conditional, LongWork, Outcome, attempt
+from .base import Conditional, Job, LongWork, Outcome, attempt
 from .results import ForPlacement, active_sensor, not_evaluated
 
 NO_COVERAGE = "There is no coverage to show: place sensors first."
@@ -67,22 +65,19 @@ class SEIP_OT_colour_coverage(Conditional, bpy.types.Operator):
         return outcome
 
 
-class SEIP_OT_show_sight_lines(ForPlacement, LongWork[SceneState], bpy.types.Operator):
+class SEIP_OT_show_sight_lines(ForPlacement, LongWork, bpy.types.Operator):
     """Draw lines from the sensor that is active in the list to the targets that it sees, and squares on those in its range that it does not see"""  # noqa: E501  # a tooltip is one line
 
     bl_idname = "seip.show_sight_lines"
     bl_label = "Show Sight Lines"
     bl_options = {"REGISTER"}  # nothing in the file changes
 
-    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, SceneState]:
-        """Return the job that restores the placement."""
-        return scene_survey.with_placement(scene)
-
-    def conclude(self, scene: bpy.types.Scene, result: SceneState) -> None:
-        """Draw them."""
-        session.of(scene).state = result
+    def job(self, scene: bpy.types.Scene) -> Job:
+        """Restore the placement, and draw them."""
+        scene, state = yield scene_survey.with_placement(scene)
+        session.of(scene).state = state
         obj, label = active_sensor(scene), scene.seip.result.active_label()
-        survey, _ = result.placed()
+        survey, _ = state.placed()
         key = str(obj.get(contract.SENSOR))
         pose = pose_at(survey.site.candidates, key, *pose_of(obj))
         if pose is None:
@@ -109,7 +104,7 @@ class SEIP_OT_hide_overlay(bpy.types.Operator):
         return {"FINISHED"}
 
 
-class SEIP_OT_save_picture(ForPlacement, LongWork[SceneState], bpy.types.Operator):
+class SEIP_OT_save_picture(ForPlacement, LongWork, bpy.types.Operator):
     """Write a view of the placement with its legend, and the plan beside it, as one PNG"""
 
     bl_idname = "seip.save_picture"
@@ -123,22 +118,19 @@ class SEIP_OT_save_picture(ForPlacement, LongWork[SceneState], bpy.types.Operato
 
     obstacles = (*ForPlacement.obstacles, not_evaluated)
 
-    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, SceneState]:
-        """Return the job that restores the placement."""
-        self._path = _free(_named(scene.seip.view.picture))
-        return scene_survey.with_placement(scene)
-
-    def conclude(self, scene: bpy.types.Scene, result: SceneState) -> None:
-        """Take the picture of a viewport."""
-        session.of(scene).state = result
+    def job(self, scene: bpy.types.Scene) -> Job:
+        """Restore the placement, and take the picture of a viewport."""
+        path = _free(_named(scene.seip.view.picture))
+        scene, state = yield scene_survey.with_placement(scene)
+        session.of(scene).state = state
         area = getattr(self, "_area", None) or bpy.context.area
         if bpy.app.background or area not in overlays.viewports(bpy.context.window_manager.windows):
             raise SeipError(
                 "there is no viewport here to take a picture of: press this in the sidebar of one, or export the files "
                 "with the rendered view"
             )
-        save_viewport_sheet(self._path, result, view_pixels(scene, area))
-        self.report({"INFO"}, f"written {self._path}")
+        save_viewport_sheet(path, state, view_pixels(scene, area))
+        self.report({"INFO"}, f"written {path}")
 
 
 def save_viewport_sheet(path: Path, state: SceneState, pixels: NDArray[np.uint8]) -> None:

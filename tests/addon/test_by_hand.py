@@ -200,7 +200,7 @@ def test_an_export_that_fails_or_is_stopped_leaves_the_earlier_one_whole(placed,
     assert before.keys() == {*FILES, "visibility.npz"} - {"view.png"}
     placed.seip.goal.count = 1
     bpy.ops.seip.solve_placement()
-    work = bpy.types.SEIP_OT_export_result.prepare(type("Operator", (), {})(), placed)
+    work = next(bpy.types.SEIP_OT_export_result.job(None, placed))
     for _ in range(3):
         next(work)
     work.close()  # as Stop does

@@ -72,7 +72,7 @@ def test_evaluate_only_states_what_traffic_leaves_of_the_placement_for_the_empty
 
 
 def test_runs_are_read_in_work_that_can_be_stopped(coarse):
-    work = SEIP_OT_solve_placement.prepare(SimpleNamespace(), coarse)
+    work = next(SEIP_OT_solve_placement.job(SimpleNamespace(), coarse))
     assert any(progress.what == "reading runs of traffic" for progress in work)
     work.close()
     assert session.of(coarse).state is None

@@ -123,7 +123,7 @@ def test_a_placement_with_the_grid_at_hand_casts_no_ray(junction, monkeypatch):
 
 def work_of(operator: str, scene: bpy.types.Scene) -> Generator[Progress, None, object]:
     """Return the work of a button, which a thread would do."""
-    return getattr(bpy.types, operator).prepare(SimpleNamespace(), scene)
+    return next(getattr(bpy.types, operator).job(SimpleNamespace(), scene))
 
 
 def test_the_best_so_far_is_drawn_and_taken_away_again(junction):

@@ -3,7 +3,6 @@
 import re
 import shutil
 from pathlib import Path
-from types import SimpleNamespace
 
 from headless import traffic
 
@@ -96,7 +95,7 @@ def test_a_map_of_another_place_is_refused_and_nothing_is_written(site, tmp_path
 
 @needs_sumo
 def test_stopped_simulation_leaves_nothing(site, tmp_path):
-    work = SEIP_OT_simulate_traffic.prepare(SimpleNamespace(), site)
+    work = next(SEIP_OT_simulate_traffic.job(None, site))
     assert next(work).what == "simulating run 1 of 2"
     next(work)
     work.close()

@@ -143,16 +143,12 @@ def test_a_moved_object_makes_the_verification_old(verified):
 
 def test_stopped_work_leaves_nothing(placed, tmp_path):
     operator = SEIP_OT_verify
-    steps = operator.prepare(_Stub(), placed)
+    steps = next(operator.job(None, placed))
     for _ in range(25):
         next(steps)
     steps.close()
     assert not (tmp_path / "out").exists()
     assert session.of(placed).verification is None
-
-
-class _Stub:
-    """Stands in for an operator that Blender would make."""
 
 
 def no_sensors(scene, folder):
