@@ -134,7 +134,7 @@ class CheckedScene:
     watch : Watch
         Whether the scene has changed since.
     settings : SurveySettings or str
-        See `scene_status.checked_settings`.
+        See `scene_status.survey_settings`.
     """
 
     found: SiteCheck

@@ -16,7 +16,7 @@ from ..core.progress import Progress
 from ..core.storage.files import check_folder, digest, unfinished_name
 from ..core.workflows.detection import INSTALL, DetectionJob, detect_elsewhere
 from ..core.workflows.traffic_runs import found_runs
-from ..properties.conversion import absolute, output_folder, runs_folder
+from ..properties.conversion import absolute, runs_folder, saved_path
 from ..scene import contract
 from ..scene.blend_file import save_blend
 from ..scene.sensors import labelled_sensors, pose_of
@@ -66,7 +66,7 @@ class SEIP_OT_detect(LongWork, bpy.types.Operator):
             preferences.catalogue_files(),
             scene.seip.survey.weather(),
         )
-        folder = output_folder(request.folder, "the figures")
+        folder = saved_path(request.folder, "the figures")
         sensors = sensors_key(scene)
         scene, result = yield started(_detected(job, folder))
         scene.seip.detection.record, scene.seip.detection.sensors = result, sensors

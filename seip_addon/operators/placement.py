@@ -22,7 +22,7 @@ from ..core.workflows.finalists import check_judged, find_finalists, judge_elsew
 from ..core.workflows.placing import place, with_context
 from ..core.workflows.survey import Layout
 from ..core.workflows.traffic_runs import TrafficRuns, found_runs, read_runs
-from ..properties.conversion import output_folder, runs_folder
+from ..properties.conversion import runs_folder, saved_path
 from ..scene.write import write_result
 from ..session import SceneState, scene_of, session
 from ..viewport import coverage, overlays, search
@@ -109,7 +109,7 @@ class SEIP_OT_judge_placement(_Placing, bpy.types.Operator):
         check_judged(objective)
         runs = tuple(found_runs(runs_folder(seip.goal.runs)))
         job = DetectionJob(python, runs, None, preferences.catalogue_files(), seip.survey.weather())
-        folder = output_folder(seip.detection.folder, "the detections")
+        folder = saved_path(seip.detection.folder, "the detections")
         self.acceptance = Acceptance()
         steps = _judged(scene_survey.survey(scene), objective, job, folder, self.acceptance)
         self._store(*(yield started(steps)))

@@ -19,7 +19,7 @@ from ..core.choosing.placement.objective import Objective
 from ..core.errors import SeipError
 from ..core.output.pictures.colours import compare, packed_counts, unpacked_counts
 from ..core.output.report.sections import write_report
-from ..core.output.results.answer import answer, change_text
+from ..core.output.results.answer import answer, change_text, sentence
 from ..core.output.results.placement_record import PlacementRecord, Provenance, parsed_record
 from ..core.output.results.versions import versions
 from ..core.progress import Progress
@@ -29,6 +29,7 @@ from ..core.storage.files import check_folder, digest
 from ..core.workflows.moved_sensors import evaluate_moved_sensors
 from ..core.workflows.records import record_of
 from ..core.workflows.returns import SensorReturns
+from ..properties.conversion import complaint, saved_path
 from ..scene.blend_file import save_blend
 from ..scene.coverage_colours import recolour, show_seen_by
 from ..scene.gltf import save_glb
@@ -55,11 +56,7 @@ def no_placement(scene: bpy.types.Scene) -> str:
     if not scene.seip.result.record:
         missing = "There is no placement yet: place sensors first."
         return scene_status.UNEVALUATED if scene_status.has_unevaluated(scene) else missing
-    try:
-        parsed_record(scene.seip.result.record)
-    except SeipError as error:
-        return str(error)
-    return ""
+    return complaint(lambda: parsed_record(scene.seip.result.record))
 
 
 class ForPlacement(ForReadyScene):
@@ -70,18 +67,14 @@ class ForPlacement(ForReadyScene):
 
 def no_folder(scene: bpy.types.Scene) -> str:
     """Say why there is no folder yet to write the result to, and the cure; empty if there is one."""
-    folder = scene.seip.result.folder
-    if not folder:
-        return "Name a folder to write the result to."
-    if bpy.data.filepath or not folder.startswith("//"):
-        return ""
-    return f"Save the file, or choose another folder: {folder[2:] or 'this one'} is beside the file."
+    problem = complaint(lambda: saved_path(scene.seip.result.folder, "the result"))
+    return sentence(problem) if problem else ""
 
 
 def not_evaluated(scene: bpy.types.Scene) -> str:
     """Say what was done by hand to the sensors since they were placed or evaluated; empty if nothing was."""
-    sentence = sensor_edits(scene).describe()
-    return f"{sentence} Press Evaluate Sensors, or undo." if sentence else ""
+    edits = sensor_edits(scene).describe()
+    return f"{edits} Press Evaluate Sensors, or undo." if edits else ""
 
 
 class SEIP_OT_look_from_sensor(ForPlacement, ShortWork, bpy.types.Operator):
@@ -187,24 +180,16 @@ class SEIP_OT_show_comparison(ForPlacement, ShortWork, bpy.types.Operator):
     bl_label = "Show Difference"
     bl_options = {"REGISTER", "UNDO"}
 
-    back: bpy.props.BoolProperty(
-        name="Back", description="Show the coverage of the present placement again", default=False
-    )
-
     def act(self, context: bpy.types.Context) -> None:
         """Colour the road."""
         scene = context.scene
         seip = scene.seip
-        present = unpacked_counts(seip.result.seen)
-        if self.back:
-            show_seen_by(scene, present)
-            return
         if not 0 <= seip.active_kept < len(seip.kept):
             raise SeipError("keep a placement first, to compare the present one with it")
         kept = seip.kept[seip.active_kept]
         if kept.targets != seip.result.targets:
             raise SeipError(OTHER_TARGETS)
-        colours = compare(unpacked_counts(kept.seen), present)
+        colours = compare(unpacked_counts(kept.seen), unpacked_counts(seip.result.seen))
         recolour(scene, colours)
         shares = ", ".join(f"{words} {share:.2%}" for words, share in zip(colours.words, colours.shares, strict=True))
         self.report({"INFO"}, f"{kept.name} and the present placement: {shares} of the road")
@@ -308,7 +293,7 @@ class _Writes(ForPlacement, LongWork):
 
 def _checked_folder(scene: bpy.types.Scene) -> Path:
     """Return the folder of the result, which can be written."""
-    folder = Path(bpy.path.abspath(scene.seip.result.folder))
+    folder = saved_path(scene.seip.result.folder, "the result")
     check_folder(folder)
     return folder
 

@@ -24,7 +24,7 @@ from ..core.workflows.survey_settings import SurveySettings
 from ..core.world.openstreetmap.map_links import parsed_position
 from ..core.world.streetscape.site_file import DESCRIPTION_SUFFIX
 from ..properties import traffic
-from ..properties.conversion import absolute
+from ..properties.conversion import absolute, complaint
 from ..properties.site import ROLE_ITEMS, SEIP_PG_site
 from ..scene import contract, roles
 from ..scene.build import build_scene, remove_site
@@ -155,11 +155,7 @@ def missing_for_build(scene: bpy.types.Scene) -> str:
         return preferences.NO_SUMO
     if not site.has_place():
         return NO_PLACE
-    try:
-        site.request()
-    except SeipError as error:
-        return str(error)
-    return ""
+    return complaint(site.request)
 
 
 class _BuildsSite(_WritesScene, LongWork):
@@ -347,25 +343,19 @@ class SEIP_OT_check_site(LongWork, bpy.types.Operator):
 
     def job(self, scene: bpy.types.Scene) -> Job:
         """Check the scene as it is now, and hold what was found."""
-        watching, of = watch(scene), scene_status.checked_settings(scene)
-        contents = contents_of(scene)
-        settings: SurveySettings | SeipError
-        try:
-            settings = scene.seip.survey.settings()
-        except SeipError as error:
-            settings = error
-        scene, found = yield _checked(contents, settings)
-        session.of(scene).check = CheckedScene(found, watching, of)
+        watching, settings = watch(scene), scene_status.survey_settings(scene)
+        scene, found = yield _checked(contents_of(scene), settings)
+        session.of(scene).check = CheckedScene(found, watching, settings)
         bpy.context.window_manager.seip_sections.follow_steps()
         self.report({"INFO"}, in_short(found.problems))
 
 
-def _checked(contents: SceneContents, settings: SurveySettings | SeipError) -> Generator[Progress, None, SiteCheck]:
+def _checked(contents: SceneContents, settings: SurveySettings | str) -> Generator[Progress, None, SiteCheck]:
     """Check a scene."""
 
     def laid_out(geometry: SceneGeometry) -> tuple[Site, tuple[str, ...]]:
-        if isinstance(settings, SeipError):
-            raise settings
+        if isinstance(settings, str):
+            raise SeipError(settings)
         layout = lay_out(geometry, settings)
         keys = settings.candidates.sensors  # warnings about a type are shown with the type
         return layout.site, tuple(relevant_warnings(layout.warnings, keys, ()))

@@ -22,7 +22,7 @@ from ..core.site.scene_geometry import SceneGeometry
 from ..core.sumo_installation import install_sumo
 from ..core.workflows.recording import RecordingSettings, make_run, record, simulation_of
 from ..core.workflows.traffic_simulation import SimulatedRuns, simulate_runs
-from ..properties.conversion import output_folder
+from ..properties.conversion import saved_path
 from ..scene import contract
 from ..scene.read import read_scene
 from ..scene.sensors import labelled_sensors, read_sensors
@@ -143,7 +143,7 @@ class SEIP_OT_write_dataset(LongWork, bpy.types.Operator):
     def job(self, scene: bpy.types.Scene) -> Job:
         """Record the scene as it is, and say what was written."""
         read = _SceneRead(scene)
-        folder = output_folder(scene.seip.traffic.folder, "the scans")
+        folder = saved_path(scene.seip.traffic.folder, "the scans")
         scene, (written, warnings) = yield _recorded(read, folder)
         read.keep_traffic(scene)
         for sentence in warnings:
@@ -242,7 +242,7 @@ class SEIP_OT_simulate_traffic(LongWork, bpy.types.Operator):
             raise SeipError(NO_MAP)
         named, key = request.folder, request.key()
         geometry = read_scene(scene).geometry
-        more = (request.settings(), request.count, geometry, output_folder(request.folder, "the runs of traffic"))
+        more = (request.settings(), request.count, geometry, saved_path(request.folder, "the runs of traffic"))
         if isinstance(found, Path):
             steps = simulate_runs(found, *more, preferences.sumo_folders())
         else:

@@ -23,7 +23,7 @@ from ..core.storage.files import check_folder, whole_file
 from ..core.workflows.survey_settings import SurveySettings
 from ..core.workflows.verification_record import record_of, write_verification
 from ..core.workflows.verifying import verify
-from ..properties.conversion import absolute, output_folder
+from ..properties.conversion import absolute, saved_path
 from ..scene.changes import watch
 from ..scene.corrections import correct_scene
 from ..scene.read import read_scene
@@ -66,7 +66,7 @@ def picture_of(scene: bpy.types.Scene) -> Path | None:
 
 
 def _folder_of(scene: bpy.types.Scene) -> Path:
-    return output_folder(scene.seip.result.folder, "the verification") / VERIFICATION_FOLDER
+    return saved_path(scene.seip.result.folder, "the verification") / VERIFICATION_FOLDER
 
 
 class SEIP_OT_verify(LongWork, bpy.types.Operator):

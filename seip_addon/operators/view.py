@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from .. import last_scan, scene_survey
 from ..core.errors import SeipError
 from ..core.sensing.visibility.sight_lines import pose_at, sight_lines
+from ..properties.conversion import saved_path
 from ..scene import contract
 from ..scene.coverage_colours import colour_coverage
 from ..scene.sensors import pose_of
@@ -150,9 +151,7 @@ def save_viewport_sheet(path: Path, state: SceneState, pixels: NDArray[np.uint8]
 
 
 def _named(text: str) -> Path:
-    if text.startswith("//") and not bpy.data.filepath:
-        raise SeipError(f"the picture {text} is beside the file, and the file has not been saved: save it first")
-    path = Path(bpy.path.abspath(text))
+    path = saved_path(text, "the picture")
     if not path.name or path.is_dir():
         raise SeipError("name a file for the picture, not a folder")
     return path.with_suffix(".png")

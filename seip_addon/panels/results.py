@@ -191,8 +191,9 @@ def _draw_comparison(layout: bpy.types.UILayout, context: bpy.types.Context) -> 
         draw_reason(layout, results.OTHER_TARGETS)
         return
     _draw_shares(layout, shares)
-    layout.operator("seip.show_comparison").back = False
-    layout.operator("seip.show_comparison", text="Show Coverage").back = True
+    layout.operator("seip.show_comparison")
+    if (obj := coverage_of(context.scene)) is not None:
+        layout.operator("seip.colour_coverage", text="Show Coverage").aspect = aspects_of(obj)[0]
 
 
 def _draw_table(layout: bpy.types.UILayout, kept: PlacementRecord, present: PlacementRecord) -> None:

@@ -8,7 +8,6 @@ from typing import Any
 import bpy
 from bpy.props import CollectionProperty, EnumProperty, FloatProperty, StringProperty
 
-from ..core.errors import SeipError
 from ..core.site.scene_geometry import DEFAULT_WEIGHT
 from ..core.workflows.site_building import SiteRequest
 from ..core.world.elevation.at_place import TerrainRequest
@@ -18,7 +17,7 @@ from ..core.world.streetscape.description import DEFAULT_RADIUS
 from ..core.world.streetscape.site_file import DESCRIPTION_SUFFIX
 from ..preferences import overpass, sumo_folders
 from ..scene import contract, roles
-from .conversion import absolute, as_typed, of_setting, path_property
+from .conversion import absolute, as_typed, complaint, of_setting, path_property
 
 _FILE = {"subtype": "FILE_PATH", "options": {"PATH_SUPPORTS_BLEND_RELATIVE"}}
 _CODE = {"min": 0, "max": 999_999}
@@ -85,11 +84,7 @@ class SEIP_PG_site(bpy.types.PropertyGroup):
 
     def wrong_position(self, text: str) -> str:
         """Return what is wrong with a position, or ""."""
-        try:
-            parsed_position(text)
-        except SeipError as error:
-            return str(error)
-        return ""
+        return complaint(lambda: parsed_position(text))
 
     def has_place(self) -> bool:
         """Return whether enough is chosen to build a site: a map has a middle, an extract none."""

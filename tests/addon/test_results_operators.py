@@ -54,7 +54,6 @@ def test_two_placements_are_compared_target_by_target(placed):
     layout = DrawnLayout()
     results_panel.draw(layout, bpy.context)
     assert f"Seen only by the kept {np.mean(before & ~after):.2%}" in layout.text
-    bpy.ops.seip.show_comparison(back=True)
     assert (shown(placed) > 0).sum() == after.sum()
 
 
