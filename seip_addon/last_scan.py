@@ -6,15 +6,12 @@ from collections.abc import Sequence
 import bpy
 import numpy as np
 
-from .core.arrays import Float
 from .core.output.pictures.colours import By, cloud_colours, sensor_colour, strength_ramp
 from .core.output.pictures.palette import MAX_INTENSITY, STATIC_COLOUR, rgb
 from .core.sensing.scans.frame import Frame
 from .core.sensing.scans.run_folder import Run
 from .core.sensing.scans.sensor import MountedSensor
 from .core.sensing.scans.simulation import Simulation
-from .core.sensing.traffic.source import TrafficFiles
-from .core.sensing.traffic.trajectories import Trajectories
 from .core.workflows.recording import frame_number
 from .overlay import Block, Colour, Entry, Layer, Overlay
 from .session import LastScan, session
@@ -23,20 +20,6 @@ from .viewport import overlays
 NAME = "point cloud"
 RAMP_STEPS = 8
 POINT_SIZE = 2.0  # pixels, at the interface's usual scale
-
-
-def known_traffic(scene: bpy.types.Scene, files: TrafficFiles, origin: Float) -> Trajectories | None:
-    """Return the traffic of files that were read before and are still the same, None otherwise."""
-    own = session.of(scene).traffic
-    if own is None or (own.files, own.changed) != (files, changes(files)):
-        return None
-    return own.trajectories if np.array_equal(own.trajectories.origin, origin) else None
-
-
-def changes(files: TrafficFiles) -> tuple[float, ...]:
-    """Return when each of the files was last written; 0 for one that is not there."""
-    paths = (files.path, *files.routes, *([files.net] if files.net else []))
-    return tuple(path.stat().st_mtime if path.is_file() else 0.0 for path in paths)
 
 
 def now(scene: bpy.types.Scene) -> float:

@@ -123,7 +123,8 @@ def cores() -> int | None:
 
 def catalogue_files() -> tuple[Path, ...]:
     """Return the user's own catalogues."""
-    return tuple(Path(bpy.path.abspath(file.path)) for file in _given("catalogues", ()) if file.path)
+    files: Any = _given("catalogues", ())
+    return tuple(Path(bpy.path.abspath(file.path)) for file in files if file.path)
 
 
 def catalogue() -> dict[str, LidarModel]:

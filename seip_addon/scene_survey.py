@@ -18,13 +18,14 @@ from . import preferences
 from .core.errors import SeipError
 from .core.output.results.placement_record import PlacementRecord, parsed_record
 from .core.progress import Progress
+from .core.storage.files import check_folder
 from .core.workflows.records import inputs_of, restored_solution
 from .core.workflows.survey import Survey, lay_out, see
 from .scene import changes
 from .scene.changes import watch
 from .scene.read import SceneReading, read_scene
 from .scene_status import FILE_VERSION, obstacle, same_grid
-from .session import Resources, SceneState, session
+from .session import SceneState, session
 from .viewport import overlays
 
 LOAD_DELAY = 0.2
@@ -43,12 +44,12 @@ def survey(scene: bpy.types.Scene) -> Generator[Progress, None, SceneState]:
     settings = scene.seip.survey.settings()
     settings.models()  # refuses before the scene is read
     catalogues = tuple((path, path.stat().st_mtime_ns) for path in settings.catalogue)
-    resources = Resources(preferences.cache_folder(), preferences.cores())
+    cache, cores = preferences.cache_folder(), preferences.cores()
     state = session.of(scene).state
     if state is not None and not state.watch.look(scene) and state.catalogues == catalogues:
         if same_grid(settings, state.layout.settings):
             layout = replace(state.layout, settings=settings)
-            return _nothing_to_do(replace(state, layout=layout, resources=resources))
+            return _nothing_to_do(replace(state, layout=layout, grid_file=cache / state.grid_file.name, cores=cores))
         reading, watching = SceneReading(state.layout.geometry, state.warnings), state.watch
     else:
         watching, reading = watch(scene), read_scene(scene)
@@ -59,9 +60,9 @@ def survey(scene: bpy.types.Scene) -> Generator[Progress, None, SceneState]:
         began = time.perf_counter()
         layout = lay_out(reading.geometry, settings, reading.warnings)
         durations = {"read the scene": seconds, "lay out the site": time.perf_counter() - began}
-        return SceneState(
-            layout, inputs_of(layout), watching, resources, catalogues, reading.warnings, durations=durations
-        )
+        inputs = inputs_of(layout)
+        file = cache / f"{inputs['visibility'][:32]}.npz"
+        return SceneState(layout, inputs, watching, file, cores, catalogues, reading.warnings, durations=durations)
 
     return steps()
 
@@ -71,9 +72,11 @@ def with_visibility(state: SceneState) -> Generator[Progress, None, tuple[SceneS
     if state.survey is not None:
         return state, state.survey
     began = time.perf_counter()
-    state.resources.check()
-    file = state.resources.grid_file(state.inputs["visibility"])
-    survey = yield from see(state.layout, file, threads=state.resources.cores)
+    try:
+        check_folder(state.grid_file.parent)
+    except SeipError as error:
+        raise SeipError(f"{error} as Cache in the add-on's preferences") from error
+    survey = yield from see(state.layout, state.grid_file, threads=state.cores)
     return replace(state, layout=survey, durations=state.timed("visibility", began)), survey
 
 
@@ -104,7 +107,7 @@ def with_grid_of(
     state = yield from surveying
     if not record.is_of(state.inputs):
         raise SeipError("the scene or its settings have changed since the placement: place again")
-    if state.survey is None and not state.resources.grid_file(state.inputs["visibility"]).exists():
+    if state.survey is None and not state.grid_file.exists():
         raise SeipError("the cache no longer holds the visibility of this placement: place again")
     return (yield from with_visibility(state))
 

@@ -89,7 +89,8 @@ class SEIP_OT_solve_placement(ForReadyScene, _Placing, bpy.types.Operator):
         objective = goal.objective()
         folder = runs_folder(goal.runs) if objective.scenarios.kind == "traffic" else None
         self.acceptance = Acceptance()
-        self._store(*(yield _placed(scene_survey.survey(scene), objective, folder, self.acceptance)))
+        scene, state = yield _placed(scene_survey.survey(scene), objective, folder, self.acceptance)
+        self._store(scene, state)
 
 
 class SEIP_OT_judge_placement(_Placing, bpy.types.Operator):
@@ -112,7 +113,8 @@ class SEIP_OT_judge_placement(_Placing, bpy.types.Operator):
         folder = saved_path(seip.detection.folder, "the detections")
         self.acceptance = Acceptance()
         steps = _judged(scene_survey.survey(scene), objective, job, folder, self.acceptance)
-        self._store(*(yield started(steps)))
+        scene, state = yield started(steps)
+        self._store(scene, state)
 
 
 def _judged(
@@ -144,8 +146,7 @@ def _placed(
     state = yield from surveying
     runs = None if folder is None else (yield from read_runs(found_runs(folder), state.layout))
     check_objective(state.layout.site, state.layout.models, objective)
-    grid_file = state.resources.grid_file(state.inputs["visibility"])
-    early = yield from early_answer(state.layout, objective, grid_file, state.resources.cores)
+    early = yield from early_answer(state.layout, objective, state.grid_file, state.cores)
     steps = after_early_answer(early, _searched(state, objective, runs, acceptance))
     return (yield from altered(steps, lambda step: _Searching(**vars(step), layout=state.layout)))
 

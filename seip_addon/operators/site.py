@@ -187,7 +187,7 @@ class _BuildsSite(_WritesScene, LongWork):
         if self.is_chosen and is_of_choice(scene):
             remove_site(scene)
             return scene
-        if has_site(scene):
+        if not scene_status.has_nothing(scene):
             new = bpy.data.scenes.new(name)
             if self.is_chosen:
                 _copy_choice(scene.seip.site, new.seip.site)
@@ -261,12 +261,7 @@ def _bring_to_front(scene: bpy.types.Scene) -> None:
 
 def is_of_choice(scene: bpy.types.Scene) -> bool:
     """Return whether the site of a scene is of the chosen place on the chosen map: a new one replaces it."""
-    return has_site(scene) and scene.get(contract.BUILT) == scene.seip.site.place()
-
-
-def has_site(scene: bpy.types.Scene) -> bool:
-    """Return whether a scene has any of the collections that a site is read from."""
-    return any(contract.base_name(collection) in contract.INPUTS for collection in scene.collection.children_recursive)
+    return not scene_status.has_nothing(scene) and scene.get(contract.BUILT) == scene.seip.site.place()
 
 
 class SEIP_OT_assign_role(_WritesScene, ShortWork, bpy.types.Operator):

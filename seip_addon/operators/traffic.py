@@ -15,10 +15,8 @@ from ..core.errors import SeipError
 from ..core.output.results.versions import versions
 from ..core.progress import Progress, finish
 from ..core.sensing.scans.run_folder import Record, Run, check_run_folder
-from ..core.sensing.scans.sensor import MountedSensor
-from ..core.sensing.traffic.source import TrafficFiles, describe_categories, load_traffic
+from ..core.sensing.traffic.source import describe_categories, load_traffic
 from ..core.sensing.traffic.trajectories import Trajectories
-from ..core.site.scene_geometry import SceneGeometry
 from ..core.sumo_installation import install_sumo
 from ..core.workflows.recording import RecordingSettings, make_run, record, simulation_of
 from ..core.workflows.traffic_simulation import SimulatedRuns, simulate_runs
@@ -27,7 +25,7 @@ from ..scene import contract
 from ..scene.read import read_scene
 from ..scene.sensors import labelled_sensors, read_sensors
 from ..scene.traffic import animate, clear_traffic, read_traffic
-from ..session import LastScan, SceneTraffic, session
+from ..session import LastScan, session
 from .base import Conditional, Job, LongWork, Outcome
 
 NO_FILE = "There is no traffic file: name one, or animate objects of your own in SEIP Traffic."
@@ -66,21 +64,20 @@ class SEIP_OT_load_traffic(LongWork, bpy.types.Operator):
 
     def job(self, scene: bpy.types.Scene) -> Job:
         """Read the traffic onto the scene, and animate its road users."""
-        files = scene.seip.traffic.files()
-        changed = last_scan.changes(files)
-        scene, result = yield load_traffic(files, read_scene(scene).geometry)
-        show_traffic(scene, SceneTraffic(files, changed, result.trajectories), result.warnings)
+        scene, result = yield load_traffic(scene.seip.traffic.files(), read_scene(scene).geometry)
+        show_traffic(scene, result.trajectories, result.warnings)
         for sentence in result.warnings:
             self.report({"WARNING"}, sentence)
         self.report({"INFO"}, f"{counted(len(result.trajectories), 'road user')}; press play")
 
 
-def show_traffic(scene: bpy.types.Scene, traffic: SceneTraffic, warnings: Sequence[str]) -> None:
+def show_traffic(scene: bpy.types.Scene, trajectories: Trajectories, warnings: Sequence[str]) -> None:
     """Animate road users read from files, in place of earlier ones and of their scan, and note what there is."""
-    animate(scene, traffic.trajectories)
+    animate(scene, trajectories)
     last_scan.hide_cloud(scene)
-    session.of(scene).traffic = traffic
-    scene.seip.traffic.loaded = "\n".join((*_facts(traffic.trajectories), *warnings))
+    begin, end = trajectories.span
+    users = f"{counted(len(trajectories), 'road user')}, {begin:g} to {end:g} s"
+    scene.seip.traffic.loaded = "\n".join((users, describe_categories(trajectories), *warnings))
 
 
 class SEIP_OT_clear_traffic(Conditional, bpy.types.Operator):
@@ -96,7 +93,6 @@ class SEIP_OT_clear_traffic(Conditional, bpy.types.Operator):
         """Take it out."""
         scene = context.scene
         clear_traffic(scene)
-        session.of(scene).traffic = None
         last_scan.hide_cloud(scene)
         scene.seip.traffic.loaded = ""
         return {"FINISHED"}
@@ -112,17 +108,17 @@ class SEIP_OT_scan_frame(LongWork, bpy.types.Operator):
 
     def job(self, scene: bpy.types.Scene) -> Job:
         """Scan the scene as it is, and show the points."""
-        read = _SceneRead(scene)
-        scene, result = yield _scanned(read, last_scan.now(scene), session.of(scene).scan)
-        read.keep_traffic(scene)
+        scene, result = yield _scanned(_run_of(scene), last_scan.now(scene), session.of(scene).scan)
         last_scan.keep(scene, result)
         for sentence in result.simulation.warnings:
             self.report({"WARNING"}, sentence)
         self.report({"INFO"}, f"{counted(len(result.frame), 'point')} in {1e3 * result.seconds:.0f} ms")
 
 
-def _scanned(read: _SceneRead, at: float, before: LastScan | None) -> Generator[Progress, None, LastScan]:
-    run = yield from read.run()
+def _scanned(
+    reading: Generator[Progress, None, Run], at: float, before: LastScan | None
+) -> Generator[Progress, None, LastScan]:
+    run = yield from reading
     if before is not None and before.run.key == run.key:
         run, simulation = before.run, before.simulation
     else:
@@ -142,55 +138,34 @@ class SEIP_OT_write_dataset(LongWork, bpy.types.Operator):
 
     def job(self, scene: bpy.types.Scene) -> Job:
         """Record the scene as it is, and say what was written."""
-        read = _SceneRead(scene)
         folder = saved_path(scene.seip.traffic.folder, "the scans")
-        scene, (written, warnings) = yield _recorded(read, folder)
-        read.keep_traffic(scene)
+        scene, (written, warnings) = yield _recorded(_run_of(scene), scene.seip.traffic.recording(), folder)
         for sentence in warnings:
             self.report({"WARNING"}, sentence)
         self.report({"INFO"}, f"{counted(len(written['frames']), 'frame')} in {folder}")
 
 
-def _recorded(read: _SceneRead, folder: Path) -> Generator[Progress, None, tuple[Record, tuple[str, ...]]]:
-    run = yield from read.run()
+def _recorded(
+    reading: Generator[Progress, None, Run], settings: RecordingSettings, folder: Path
+) -> Generator[Progress, None, tuple[Record, tuple[str, ...]]]:
+    run = yield from reading
     check_run_folder(folder, run)
     simulation = yield from simulation_of(run)
-    return (yield from record(folder, run, simulation, read.settings)), tuple(simulation.warnings)
+    return (yield from record(folder, run, simulation, settings)), tuple(simulation.warnings)
 
 
-class _SceneRead:
-    """All that scans follow from, as the scene is now."""
+def _run_of(scene: bpy.types.Scene) -> Generator[Progress, None, Run]:
+    """Return a job that gathers all that scans follow from, as the scene is now; it reads the traffic of files."""
+    settings: RecordingSettings = scene.seip.traffic.recording()
+    geometry, sensors = read_scene(scene).geometry, read_sensors(scene, preferences.catalogue())
+    files = scene.seip.traffic.files()
+    animated = finish(read_traffic(scene)) if files is None else None
 
-    def __init__(self, scene: bpy.types.Scene) -> None:
-        self.settings: RecordingSettings = scene.seip.traffic.recording()
-        self._geometry: SceneGeometry = read_scene(scene).geometry
-        self._sensors: tuple[MountedSensor, ...] = read_sensors(scene, preferences.catalogue())
-        self._files: TrafficFiles | None = scene.seip.traffic.files()
-        self._changed: tuple[float, ...] = ()
-        self._trajectories: Trajectories | None = None
-        if self._files is None:
-            self._trajectories = finish(read_traffic(scene))
-        else:
-            self._changed = last_scan.changes(self._files)
-            self._trajectories = last_scan.known_traffic(scene, self._files, self._geometry.origin)
+    def steps() -> Generator[Progress, None, Run]:
+        trajectories = animated if animated is not None else (yield from load_traffic(files, geometry)).trajectories
+        return make_run(geometry, sensors, trajectories, settings, versions(blender=bpy.app.version_string))
 
-    def run(self) -> Generator[Progress, None, Run]:
-        """Read the traffic, where that is still to be done, and gather everything."""
-        if self._trajectories is None and self._files is not None:
-            self._trajectories = (yield from load_traffic(self._files, self._geometry)).trajectories
-        assert self._trajectories is not None  # noqa: S101  # one of the two has given it
-        made = versions(blender=bpy.app.version_string)
-        return make_run(self._geometry, self._sensors, self._trajectories, self.settings, made)
-
-    def keep_traffic(self, scene: bpy.types.Scene) -> None:
-        """Hold what was read from files, so that the next scan need not."""
-        if self._files is not None and self._trajectories is not None:
-            session.of(scene).traffic = SceneTraffic(self._files, self._changed, self._trajectories)
-
-
-def _facts(trajectories: Trajectories) -> list[str]:
-    begin, end = trajectories.span
-    return [f"{counted(len(trajectories), 'road user')}, {begin:g} to {end:g} s", describe_categories(trajectories)]
+    return steps()
 
 
 class SEIP_OT_install_sumo(LongWork, bpy.types.Operator):
@@ -253,8 +228,7 @@ class SEIP_OT_simulate_traffic(LongWork, bpy.types.Operator):
         seip.traffic.file = bpy.path.relpath(first) if named.startswith("//") else first
         seip.detection.runs = seip.goal.runs = named
         seip.simulation.facts, seip.simulation.made_with = result.summary, key
-        files = TrafficFiles(result.paths[0])
-        show_traffic(scene, SceneTraffic(files, last_scan.changes(files), result.first), result.warnings[0])
+        show_traffic(scene, result.first, result.warnings[0])
         for sentence in result.messages:
             self.report({"WARNING"}, sentence)
         self.report({"INFO"}, f"{result.summary}; press play")

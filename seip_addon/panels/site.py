@@ -8,7 +8,7 @@ from .. import preferences, scene_status
 from ..core.output.results.answer import sentence
 from ..core.site.roles import Role
 from ..operators.base import Outcome
-from ..operators.site import SEIP_OT_build_site, has_site, in_short, is_of_choice, missing_for_build
+from ..operators.site import SEIP_OT_build_site, in_short, is_of_choice, missing_for_build
 from ..properties.site import SEIP_PG_site
 from ..scene import roles
 from ..session import session
@@ -67,7 +67,7 @@ def _draw_map(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
     _draw_place(layout, site)
     draw_sentence(layout, _place_text(site), icon="INFO")
     draw_sections(layout, {"sources": _draw_sources}, site)
-    if has_site(scene) and not missing_for_build(scene):
+    if not (scene_status.has_nothing(scene) or missing_for_build(scene)):
         again = "The site is built again; your own objects and the sensors stay."
         elsewhere = "The site is built in a new scene; this one stays."
         draw_sentence(layout, again if is_of_choice(scene) else elsewhere, icon="INFO")
