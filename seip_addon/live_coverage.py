@@ -1,10 +1,8 @@
 """Live coverage: computed again whenever a sensor is moved.
 
 A handler notes that something moved; a timer, a moment later, casts the rays of
-only those sensors and colours the road again. Nothing runs while this is off.
+only those sensors and colours the road again.
 """
-
-from collections.abc import Callable
 
 import bpy
 import numpy as np
@@ -34,18 +32,12 @@ def start(
     _, solution = state.placed()
     known = _as_placed(solution.deployment, returns)
     session.following = FollowedSensors(scene.session_uid, state, visibility, returns, known)
-    for event, handler in _handlers():
-        getattr(bpy.app.handlers, event).append(handler)
     update()
 
 
 def stop() -> None:
     """Stop updating coverage for moved sensors."""
-    if session.following is None:
-        return
     session.following = None
-    for event, handler in _handlers():
-        getattr(bpy.app.handlers, event).remove(handler)
     if bpy.app.timers.is_registered(update):
         bpy.app.timers.unregister(update)
 
@@ -119,7 +111,7 @@ def _on_update(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
 @bpy.app.handlers.persistent  # type: ignore[untyped-decorator]
 def _on_undo(*_: object) -> None:
     """Have a look at what an undo or redo brought back: Blender names no object."""
-    if not bpy.app.timers.is_registered(update):
+    if session.following is not None and not bpy.app.timers.is_registered(update):
         _update_soon()
 
 
@@ -127,8 +119,5 @@ def _update_soon() -> None:
     bpy.app.timers.register(update, first_interval=DELAY)
 
 
-def _handlers() -> tuple[tuple[str, Callable[..., None]], ...]:
-    return (("depsgraph_update_post", _on_update), ("undo_post", _on_undo), ("redo_post", _on_undo))
-
-
+HANDLERS = (("depsgraph_update_post", _on_update), ("undo_post", _on_undo), ("redo_post", _on_undo))
 forget = stop  # another file is opened, or the add-on is disabled

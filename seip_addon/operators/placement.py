@@ -26,7 +26,7 @@ from ..properties.conversion import runs_folder, saved_path
 from ..scene.write import write_result
 from ..session import SceneState, scene_of, session
 from ..viewport import coverage, overlays, search
-from .base import ForReadyScene, Job, LongWork, Outcome, ShortWork, started
+from .base import ForReadyScene, Job, LongWork, ShortWork, started
 from .detection import NO_PYTHON, no_python, saved_scene
 from .results import keep_result
 
@@ -162,7 +162,7 @@ def _searched(
     return replace(state, solution=solution, durations=state.timed("placement", began))
 
 
-class SEIP_OT_choose_number(bpy.types.Operator):
+class SEIP_OT_choose_number(ShortWork, bpy.types.Operator):
     """Make this number of sensors the goal of the next placement; the tick marks the present placement"""
 
     bl_idname = "seip.choose_number"
@@ -171,11 +171,10 @@ class SEIP_OT_choose_number(bpy.types.Operator):
 
     count: bpy.props.IntProperty(name="Sensors", description="Largest number of sensors", min=1, default=1)
 
-    def execute(self, context: bpy.types.Context) -> Outcome:
+    def act(self, context: bpy.types.Context) -> None:
         """Set the goal."""
         goal = context.scene.seip.goal
         goal.limit, goal.count = "COUNT", self.count
-        return {"FINISHED"}
 
 
 class SEIP_OT_add_rule(ShortWork, bpy.types.Operator):

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Generator, Mapping, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
+from itertools import count
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -113,8 +114,8 @@ def _middle_of_road(scene: bpy.types.Scene) -> Vector:
     return sum(corners, Vector()) / len(corners) if corners else Vector()
 
 
-class SEIP_OT_keep_placement(ForPlacement, bpy.types.Operator):
-    """Keep the present placement under a name, to compare later ones with it"""
+class SEIP_OT_keep_placement(ForPlacement, ShortWork, bpy.types.Operator):
+    """Keep the present placement, to compare later ones with it; its name in the list can be changed"""
 
     bl_idname = "seip.keep_placement"
     bl_label = "Keep Placement"
@@ -124,26 +125,16 @@ class SEIP_OT_keep_placement(ForPlacement, bpy.types.Operator):
 
     obstacles = (*ForPlacement.obstacles, not_evaluated)
 
-    def execute(self, context: bpy.types.Context) -> Outcome:
+    def act(self, context: bpy.types.Context) -> None:
         """Keep it, in place of another of that name."""
         seip = context.scene.seip
-        name = self.name.strip() or _free_name({one.name for one in seip.kept})
+        free = (f"Placement {number}" for number in count(1))
+        name = self.name.strip() or next(name for name in free if name not in seip.kept)
         entry = seip.kept.get(name) or seip.kept.add()
         entry.name = name
         for field in ("record", "targets", "seen"):
             setattr(entry, field, getattr(seip.result, field))
         seip.active_kept = seip.kept.find(name)
-        return {"FINISHED"}
-
-    def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> Outcome:
-        """Ask for the name."""
-        self.name = _free_name({one.name for one in context.scene.seip.kept})
-        outcome: Outcome = context.window_manager.invoke_props_dialog(self)
-        return outcome
-
-
-def _free_name(taken: set[str]) -> str:
-    return next(name for name in (f"Placement {n}" for n in range(1, len(taken) + 2)) if name not in taken)
 
 
 class SEIP_OT_remove_entry(bpy.types.Operator):
@@ -189,10 +180,8 @@ class SEIP_OT_show_comparison(ForPlacement, ShortWork, bpy.types.Operator):
         kept = seip.kept[seip.active_kept]
         if kept.targets != seip.result.targets:
             raise SeipError(OTHER_TARGETS)
-        colours = compare(unpacked_counts(kept.seen), unpacked_counts(seip.result.seen))
-        recolour(scene, colours)
-        shares = ", ".join(f"{words} {share:.2%}" for words, share in zip(colours.words, colours.shares, strict=True))
-        self.report({"INFO"}, f"{kept.name} and the present placement: {shares} of the road")
+        recolour(scene, compare(unpacked_counts(kept.seen), unpacked_counts(seip.result.seen)))
+        scene.seip.view.legend = True
 
 
 class SEIP_OT_follow_sensors(ForPlacement, LongWork, bpy.types.Operator):

@@ -92,19 +92,18 @@ class SEIP_OT_empty_cache(ShortWork, bpy.types.Operator):
         self.report({"INFO"}, f"{counted(count, 'file')} deleted")
 
 
-class SEIP_OT_preview_beams(bpy.types.Operator):
+class SEIP_OT_preview_beams(ShortWork, bpy.types.Operator):
     """Show or hide the beams of the selected sensor, or else of the sensor shown in the sidebar at the 3D cursor: rings on a flat road and the edges of the vertical field of view"""  # noqa: E501  # a tooltip is one line
 
     bl_idname = "seip.preview_beams"
     bl_label = "Preview Beams"
 
-    def execute(self, context: bpy.types.Context) -> Outcome:
+    def act(self, context: bpy.types.Context) -> None:
         """Show or hide them."""
         if overlays.find(context.scene, beam_preview.NAME):
             overlays.hide(context.scene, beam_preview.NAME)
         else:
             overlays.show(context.scene, beam_preview.NAME, beam_preview.beam_overlay())
-        return {"FINISHED"}
 
 
 class SEIP_MT_survey_presets(bpy.types.Menu):

@@ -295,7 +295,7 @@ class _InObjectMode(_WritesScene):
         return super().why_not(context) or ("" if context.mode == "OBJECT" else "Leave Edit Mode first")
 
 
-class SEIP_OT_add_area(_InObjectMode, bpy.types.Operator):
+class SEIP_OT_add_area(_InObjectMode, ShortWork, bpy.types.Operator):
     """Add a flat area in a role at the 3D cursor; go into Edit Mode to shape it"""
 
     bl_idname = "seip.add_area"
@@ -322,12 +322,11 @@ class SEIP_OT_add_area(_InObjectMode, bpy.types.Operator):
         max=360,
     )
 
-    def execute(self, context: bpy.types.Context) -> Outcome:
+    def act(self, context: bpy.types.Context) -> None:
         """Add it, selected and active."""
         middle = tuple(context.scene.cursor.location)
         obj = roles.add_area(context.scene, Role[self.role], middle, tuple(self.size), self.turn, self.corners)
         selection.select_alone(context, obj)
-        return {"FINISHED"}
 
 
 class SEIP_OT_check_site(LongWork, bpy.types.Operator):

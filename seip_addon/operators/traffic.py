@@ -26,7 +26,7 @@ from ..scene.read import read_scene
 from ..scene.sensors import labelled_sensors, read_sensors
 from ..scene.traffic import animate, clear_traffic, read_traffic
 from ..session import LastScan, session
-from .base import Conditional, Job, LongWork, Outcome
+from .base import Job, LongWork, Outcome, ShortWork
 
 NO_FILE = "There is no traffic file: name one, or animate objects of your own in SEIP Traffic."
 NO_TRAFFIC = "There is nothing to scan: name a traffic file, or animate objects in SEIP Traffic."
@@ -80,7 +80,7 @@ def show_traffic(scene: bpy.types.Scene, trajectories: Trajectories, warnings: S
     scene.seip.traffic.loaded = "\n".join((users, describe_categories(trajectories), *warnings))
 
 
-class SEIP_OT_clear_traffic(Conditional, bpy.types.Operator):
+class SEIP_OT_clear_traffic(ShortWork, bpy.types.Operator):
     """Remove the loaded road users from the scene; your own objects stay"""
 
     bl_idname = "seip.clear_traffic"
@@ -89,13 +89,12 @@ class SEIP_OT_clear_traffic(Conditional, bpy.types.Operator):
 
     obstacles = (lambda scene: "" if contract.find(scene, contract.TRAFFIC) else "there is no traffic in the scene",)
 
-    def execute(self, context: bpy.types.Context) -> Outcome:
+    def act(self, context: bpy.types.Context) -> None:
         """Take it out."""
         scene = context.scene
         clear_traffic(scene)
         last_scan.hide_cloud(scene)
         scene.seip.traffic.loaded = ""
-        return {"FINISHED"}
 
 
 class SEIP_OT_scan_frame(LongWork, bpy.types.Operator):

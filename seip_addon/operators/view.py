@@ -23,7 +23,7 @@ from ..viewport import coverage, overlays
 from ..viewport.picture import view_pixels
 from ..viewport.sight_lines import NAME as SIGHT
 from ..viewport.sight_lines import sight_overlay
-from .base import Conditional, Job, LongWork, Outcome, attempt
+from .base import Job, LongWork, Outcome, ShortWork
 from .results import ForPlacement, active_sensor, not_evaluated
 
 NO_COVERAGE = "There is no coverage to show: place sensors first."
@@ -34,7 +34,7 @@ def why_no_coverage(scene: bpy.types.Scene) -> str:
     return NO_COVERAGE if coverage_of(scene) is None else ""
 
 
-class SEIP_OT_colour_coverage(Conditional, bpy.types.Operator):
+class SEIP_OT_colour_coverage(ShortWork, bpy.types.Operator):
     """Colour the coverage on the road, with a legend; a Solid view is set to show the colours"""
 
     bl_idname = "seip.colour_coverage"
@@ -55,15 +55,13 @@ class SEIP_OT_colour_coverage(Conditional, bpy.types.Operator):
 
     obstacles = (why_no_coverage,)
 
-    def execute(self, context: bpy.types.Context) -> Outcome:
+    def act(self, context: bpy.types.Context) -> None:
         """Colour it."""
-        outcome = attempt(self, lambda: colour_coverage(context.scene, self.aspect))
-        if outcome == {"FINISHED"}:
-            context.scene.seip.view.legend = True
-            view = context.space_data
-            if isinstance(view, bpy.types.SpaceView3D) and not coverage.shows_coverage(view):
-                coverage.set_shading(view)
-        return outcome
+        colour_coverage(context.scene, self.aspect)
+        context.scene.seip.view.legend = True
+        view = context.space_data
+        if isinstance(view, bpy.types.SpaceView3D) and not coverage.shows_coverage(view):
+            coverage.set_shading(view)
 
 
 class SEIP_OT_show_sight_lines(ForPlacement, LongWork, bpy.types.Operator):
@@ -89,7 +87,7 @@ class SEIP_OT_show_sight_lines(ForPlacement, LongWork, bpy.types.Operator):
         overlays.show(scene, SIGHT, sight_overlay(sight, label))
 
 
-class SEIP_OT_hide_overlay(bpy.types.Operator):
+class SEIP_OT_hide_overlay(ShortWork, bpy.types.Operator):
     """Hide these points or lines"""
 
     bl_idname = "seip.hide_overlay"
@@ -97,12 +95,11 @@ class SEIP_OT_hide_overlay(bpy.types.Operator):
 
     name: bpy.props.StringProperty(name="Name", description="Name of the overlay")
 
-    def execute(self, context: bpy.types.Context) -> Outcome:
+    def act(self, context: bpy.types.Context) -> None:
         """Hide it; a point cloud is forgotten, as it would be shown again in other colours."""
         if self.name == last_scan.NAME:
             last_scan.hide_cloud(context.scene)
         overlays.hide(context.scene, self.name)
-        return {"FINISHED"}
 
 
 class SEIP_OT_save_picture(ForPlacement, LongWork, bpy.types.Operator):

@@ -6,13 +6,13 @@ import bpy
 
 from .. import last_scan
 from ..core.choosing.placement.returns_summary import SURFACE_SEEN, returns_text
-from ..core.errors import SeipError
-from ..core.output.pictures.colours import BOTH, CLASS_WORDS, KEPT_ONLY, NEITHER, PRESENT_ONLY, Aspect, compared_shares
+from ..core.output.pictures.colours import Aspect
 from ..core.output.results.placement_record import PlacementRecord, parsed_record
 from ..core.sensing.lidar.model import short_name
 from ..operators import results
 from ..operators.results import no_placement
 from ..operators.view import why_no_coverage
+from ..properties.conversion import complaint
 from ..scene.write import ASPECT, aspects_of, coverage_of
 from ..sensor_edits import sensor_edits
 from ..session import FollowedSensors, session
@@ -181,16 +181,11 @@ def _draw_comparison(layout: bpy.types.UILayout, context: bpy.types.Context) -> 
         draw_sentence(layout, "Keep this placement with +, place again, and compare the two.", icon="INFO")
         return
     kept, present = seip.kept[seip.active_kept], seip.result
-    try:
-        _draw_table(layout, parsed_record(kept.record), parsed_record(present.record))
-        shares = compared_shares(kept.seen, present.seen) if kept.targets == present.targets else None
-    except SeipError as error:
-        draw_sentence(layout, str(error), icon="ERROR")
+    if draw_reason(layout, complaint(lambda: parsed_record(kept.record))):
         return
-    if shares is None:
-        draw_reason(layout, results.OTHER_TARGETS)
+    _draw_table(layout, parsed_record(kept.record), parsed_record(present.record))
+    if draw_reason(layout, results.OTHER_TARGETS if kept.targets != present.targets else ""):
         return
-    _draw_shares(layout, shares)
     layout.operator("seip.show_comparison")
     if (obj := coverage_of(context.scene)) is not None:
         layout.operator("seip.colour_coverage", text="Show Coverage").aspect = aspects_of(obj)[0]
@@ -210,16 +205,6 @@ def _draw_table(layout: bpy.types.UILayout, kept: PlacementRecord, present: Plac
     ):
         for text in (name, one, other):
             grid.label(text=text)
-
-
-def _draw_shares(layout: bpy.types.UILayout, shares: tuple[float, ...]) -> None:
-    """Draw which share of the road both placements see, only one of them, and neither."""
-    layout.label(text="Share of the Road")
-    column = layout.column(align=True)
-    for number in (BOTH, KEPT_ONLY, PRESENT_ONLY, NEITHER):
-        row = column.split(factor=0.75)
-        row.label(text=f"  {CLASS_WORDS[number].capitalize()}")
-        row.label(text=f"{shares[number]:.2%}")
 
 
 def _returns(record: PlacementRecord) -> str:
