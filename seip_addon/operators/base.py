@@ -214,7 +214,7 @@ def _redraw(context: bpy.types.Context) -> None:
                     region.tag_redraw()
 
 
-class SEIP_OT_stop(Conditional, bpy.types.Operator):
+class SEIP_OT_stop(ShortWork, bpy.types.Operator):
     """Stop the work that is under way"""
 
     bl_idname = "seip.stop"
@@ -222,31 +222,30 @@ class SEIP_OT_stop(Conditional, bpy.types.Operator):
 
     obstacles = (lambda _: "nothing is under way" if session.running is None else "",)
 
-    def execute(self, _context: bpy.types.Context) -> Outcome:
+    def act(self, _context: bpy.types.Context) -> None:
         """Ask the work to stop."""
         if session.running is not None:
             session.running.stop = True
-        return {"FINISHED"}
 
 
-class SEIP_OT_accept(Conditional, bpy.types.Operator):
+class SEIP_OT_accept(ShortWork, bpy.types.Operator):
     """End the search with the best placement found so far"""
 
     bl_idname = "seip.accept"
     bl_label = "Use Best So Far"
 
-    @classmethod
-    def why_not(cls, _context: bpy.types.Context) -> str:
-        """Return a reason if no search for a placement is running."""
-        running = session.running
-        searching = running is not None and running.acceptance is not None and running.acceptance.searching
-        return "" if searching else "no search for a placement is running"
+    obstacles = (lambda _: "" if is_searching() else "no search for a placement is running",)
 
-    def execute(self, _context: bpy.types.Context) -> Outcome:
+    def act(self, _context: bpy.types.Context) -> None:
         """Ask the search to end."""
         if session.running is not None and session.running.acceptance is not None:
             session.running.acceptance.accept()
-        return {"FINISHED"}
+
+
+def is_searching() -> bool:
+    """Return whether a search for a placement is running, whose best one so far can be used."""
+    running = session.running
+    return running is not None and running.acceptance is not None and running.acceptance.searching
 
 
 def forget() -> None:

@@ -61,7 +61,7 @@ class SEIP_OT_detect(LongWork, bpy.types.Operator):
             raise SeipError(NO_PYTHON)
         job = DetectionJob(
             python,
-            tuple(found_runs(runs_folder(request.runs))),
+            tuple(found_runs(runs_folder(scene.seip.traffic.runs))),
             absolute(request.detector) if request.detector else None,
             preferences.catalogue_files(),
             scene.seip.survey.weather(),

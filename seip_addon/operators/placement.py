@@ -87,7 +87,7 @@ class SEIP_OT_solve_placement(ForReadyScene, _Placing, bpy.types.Operator):
         """Read the scene where it has changed, state the objective, and place sensors."""
         goal = scene.seip.goal
         objective = goal.objective()
-        folder = runs_folder(goal.runs) if objective.scenarios.kind == "traffic" else None
+        folder = runs_folder(scene.seip.traffic.runs) if objective.scenarios.kind == "traffic" else None
         self.acceptance = Acceptance()
         scene, state = yield _placed(scene_survey.survey(scene), objective, folder, self.acceptance)
         self._store(scene, state)
@@ -108,7 +108,7 @@ class SEIP_OT_judge_placement(_Placing, bpy.types.Operator):
             raise SeipError(NO_PYTHON)
         objective = seip.goal.objective()
         check_judged(objective)
-        runs = tuple(found_runs(runs_folder(seip.goal.runs)))
+        runs = tuple(found_runs(runs_folder(seip.traffic.runs)))
         job = DetectionJob(python, runs, None, preferences.catalogue_files(), seip.survey.weather())
         folder = saved_path(seip.detection.folder, "the detections")
         self.acceptance = Acceptance()

@@ -225,7 +225,7 @@ class SEIP_OT_simulate_traffic(LongWork, bpy.types.Operator):
         seip = scene.seip
         first = str(result.paths[0])
         seip.traffic.file = bpy.path.relpath(first) if named.startswith("//") else first
-        seip.detection.runs = seip.goal.runs = named
+        seip.traffic.runs = named
         seip.simulation.facts, seip.simulation.made_with = result.summary, key
         show_traffic(scene, result.first, result.warnings[0])
         for sentence in result.messages:

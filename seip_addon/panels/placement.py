@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from functools import partial
-from pathlib import Path
 
 import bpy
 
@@ -15,7 +14,6 @@ from ..core.counts import counted, duration_text
 from ..core.output.results.answer import answer, sentence, status_text
 from ..core.output.results.placement_record import PlacementRecord, parsed_record, relevant_warnings
 from ..core.site.obstruction import NO_OBSTACLES_MESSAGE
-from ..core.workflows.traffic_runs import traffic_folder
 from ..operators.detection import no_python
 from ..operators.results import no_placement
 from ..operators.sensors import SEIP_MT_survey_presets
@@ -23,7 +21,7 @@ from ..scene.sensors import labelled_sensors
 from ..sensor_edits import sensor_edits
 from ..session import session
 from .sections import BETWEEN, Status, draw_sections
-from .sidebar import RowList, draw_path, draw_reason, draw_run, draw_settings, is_narrow, settings_column
+from .sidebar import RowList, draw_path, draw_reason, draw_run, draw_runs, draw_settings, is_narrow, settings_column
 from .wrapped_text import BOX, draw_lines, draw_sentence, sidebar_width
 
 _SHOWN = {
@@ -129,7 +127,7 @@ def _draw_objective(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
     goal = scene.seip.goal
     column = draw_settings(layout, goal, "criterion", "scenarios")
     if goal.scenarios == "traffic":
-        draw_path(column, goal, "runs", placeholder=traffic_folder(Path(bpy.data.filepath)).name)
+        draw_runs(column, scene)
     for name in _SHOWN[goal.scenarios]:
         column.prop(goal, name)
     if goal.scenarios == "nominal" or goal.risk == "none":

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import bpy
 
 from .. import scene_status
 from ..core.progress import progress_line
+from ..core.workflows.traffic_runs import traffic_folder
 from ..session import session
 from ..viewport.overlays import TAB
 from .wrapped_text import MARGIN, draw_sentence, sidebar_width, text_width
@@ -121,6 +124,11 @@ def draw_path(
     path = getattr(owner, name)
     if text_width(path) > sidebar_width() - MARGIN - FIELD:
         draw_sentence(column, path)
+
+
+def draw_runs(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
+    """Draw the folder with runs of traffic."""
+    draw_path(layout, scene.seip.traffic, "runs", placeholder=traffic_folder(Path(bpy.data.filepath)).name)
 
 
 def is_narrow(context: bpy.types.Context) -> bool:

@@ -11,7 +11,7 @@ from .. import selection
 from ..core.choosing.placement.objective import DEFAULT_COUNT, Objective
 from ..core.choosing.placement.scenarios import Scenarios
 from ..core.sensing.scenarios.pose_errors import MAX_ANGLE_STD, PoseErrors
-from .conversion import as_typed, of_setting, path_property
+from .conversion import as_typed, of_setting
 
 
 class SEIP_PG_position_rule(bpy.types.PropertyGroup):
@@ -103,12 +103,6 @@ class SEIP_PG_goal(bpy.types.PropertyGroup):
             ("worst", "Worst Sensor", "The sensor that matters most has failed"),
             ("mean", "Any Sensor", "Mean over the failures of each sensor"),
         ),
-    )
-    runs: path_property(
-        "Runs",
-        "Folder with two or more runs of traffic (.npz); the last third of the runs is for evaluation. "
-        "Empty for the folder SCENE_traffic beside the file",
-        folder=True,
     )
     rules: CollectionProperty(type=SEIP_PG_position_rule)
     active_rule: IntProperty(name="Position")

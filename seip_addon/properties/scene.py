@@ -65,12 +65,6 @@ class SEIP_PG_result(SEIP_PG_placement):
 class SEIP_PG_detection(bpy.types.PropertyGroup):
     """Settings of detection, and the latest figures."""
 
-    runs: path_property(
-        "Runs",
-        "Folder with runs of traffic (.npz) to detect road users in, four or more for an interval. "
-        "Empty for the folder SCENE_traffic beside the file",
-        folder=True,
-    )
     detector: path_property(
         "Detector", "A trained detector (.pt) of your own; empty for the one that comes with the project"
     )
@@ -97,14 +91,6 @@ class SEIP_PG_verification(bpy.types.PropertyGroup):
     )
 
 
-def _recolour(_own: object, context: bpy.types.Context) -> None:
-    last_scan.show_cloud(context.scene)
-
-
-def _show_legend(own: bpy.types.PropertyGroup, _context: object) -> None:
-    coverage.update(own.id_data)
-
-
 class SEIP_PG_view(bpy.types.PropertyGroup):
     """Display settings of the results."""
 
@@ -112,7 +98,7 @@ class SEIP_PG_view(bpy.types.PropertyGroup):
         name="Legend",
         description="Show the legend of the coverage colours, and the sensors' labels",
         default=True,
-        update=_show_legend,
+        update=lambda own, _: coverage.update(own.id_data),
     )
     cloud_colour: EnumProperty(
         name="Point Colours",
@@ -122,7 +108,7 @@ class SEIP_PG_view(bpy.types.PropertyGroup):
             ("intensity", "Intensity", "Intensity of the return"),
             ("instance", "Road User", "Road user that the point is on"),
         ),
-        update=_recolour,
+        update=lambda own, _: last_scan.show_cloud(own.id_data),
     )
     picture: path_property(
         "Picture",

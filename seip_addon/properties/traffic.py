@@ -37,6 +37,12 @@ class SEIP_PG_traffic(bpy.types.PropertyGroup):
     )
     routes: path_property("Routes", "SUMO file with the vehicle types and their sizes")
     net: path_property("Network", "SUMO network (.net.xml) with the offset from the map")
+    runs: path_property(
+        "Runs",
+        "Folder with runs of traffic (.npz): two or more to place sensors in traffic, of which the last third evaluates "
+        "the placement, and four or more for an interval of detection. Empty for the folder SCENE_traffic beside the file",
+        folder=True,
+    )
     loaded: StringProperty(name="Loaded", description="Content of the file, one fact a line")
     seed: of_setting(ScanSettings, "seed", "Seed")
     noise: BoolProperty(

@@ -140,7 +140,7 @@ def no_sensors(scene, folder):
 
 def no_runs(scene, folder):
     (folder / "runs").mkdir()
-    scene.seip.detection.runs = str(folder / "runs")
+    scene.seip.traffic.runs = str(folder / "runs")
 
 
 @pytest.mark.parametrize(

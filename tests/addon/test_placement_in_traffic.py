@@ -109,7 +109,7 @@ def test_runs_that_are_of_no_use_are_refused_before_any_ray_is_cast(coarse, tmp_
     folder = tmp_path / "runs"
     folder.mkdir()
     wrong(folder)
-    coarse.seip.goal.runs = str(folder)
+    coarse.seip.traffic.runs = str(folder)
     with pytest.raises(RuntimeError, match=words):
         bpy.ops.seip.solve_placement()
     assert not coarse.seip.result.record

@@ -44,7 +44,7 @@ def test_runs_are_those_of_the_command_and_used_by_the_next_buttons(site, tmp_pa
     assert dict(drawn().properties)["map"]["placeholder"] == "junction.xodr"
     assert bpy.ops.seip.simulate_traffic() == {"FINISHED"}
     seip = site.seip
-    assert (seip.detection.runs, seip.goal.runs) == ("//seip-traffic/", "//seip-traffic/")
+    assert seip.traffic.runs == "//seip-traffic/"
     assert seip.traffic.file == "//seip-traffic/run-1.npz"
     users = len(bpy.data.collections["SEIP Traffic"].objects)
     assert seip.traffic.loaded.startswith(f"{users} road users, 0 to 4.8 s")
@@ -88,7 +88,7 @@ def test_a_map_of_another_place_is_refused_and_nothing_is_written(site, tmp_path
     ):
         bpy.ops.seip.simulate_traffic()
     assert not (tmp_path / "seip-traffic").exists()
-    assert not site.seip.detection.runs
+    assert not site.seip.traffic.runs
 
 
 @needs_sumo

@@ -272,7 +272,7 @@ def _simulate(window: Window) -> Steps:
     yield from window.until((runs / "run-4.npz").exists, 300)
     yield from window.until(lambda: session.running is None, 10)
     assert _scene().seip.traffic.file == "//seip-traffic/run-1.npz", _scene().seip.traffic.file
-    assert _scene().seip.detection.runs == _scene().seip.goal.runs == "//seip-traffic/"
+    assert _scene().seip.traffic.runs == "//seip-traffic/"
     yield from window.press("Z", ctrl=True)
     yield from window.until(lambda: _scene().seip.traffic.file == loaded, 5)
     yield from window.press("Z", ctrl=True, shift=True)
