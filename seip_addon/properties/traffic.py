@@ -39,8 +39,8 @@ class SEIP_PG_traffic(bpy.types.PropertyGroup):
     net: path_property("Network", "SUMO network (.net.xml) with the offset from the map")
     runs: path_property(
         "Runs",
-        "Folder with runs of traffic (.npz): two or more to place sensors in traffic, of which the last third evaluates "
-        "the placement, and four or more for an interval of detection. Empty for the folder SCENE_traffic beside the file",
+        "Folder with runs of traffic (.npz): two or more to place sensors in traffic, of which the last third is for "
+        "evaluation, and four or more for an interval of detection. Empty for the folder SCENE_traffic beside the file",
         folder=True,
     )
     loaded: StringProperty(name="Loaded", description="Content of the file, one fact a line")
