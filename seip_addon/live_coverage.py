@@ -92,7 +92,6 @@ def _same(one: MountedSensor, other: MountedSensor) -> bool:
     return same_pose((one.xyz, one.orientation), (other.xyz, other.orientation)) and one.model.key == other.model.key
 
 
-@bpy.app.handlers.persistent  # type: ignore[untyped-decorator]
 def _on_update(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     """Have a look soon where a sensor moved, came or went; never at once, as looking changes the scene."""
     if (
@@ -108,7 +107,6 @@ def _on_update(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
         _update_soon()
 
 
-@bpy.app.handlers.persistent  # type: ignore[untyped-decorator]
 def _on_undo(*_: object) -> None:
     """Have a look at what an undo or redo brought back: Blender names no object."""
     if session.following is not None and not bpy.app.timers.is_registered(update):

@@ -121,7 +121,6 @@ def _restored(surveying: Generator[Progress, None, SceneState], text: str) -> Ge
     return replace(state, solution=solution, record=text)
 
 
-@bpy.app.handlers.persistent  # type: ignore[untyped-decorator]
 def _after_load(*_: object) -> None:
     """Compare the placement of the file with its scene, soon: Blender is not ready for work yet."""
     if not bpy.app.background and not bpy.app.timers.is_registered(_compare):
@@ -142,7 +141,6 @@ def _compare() -> None:
             return
 
 
-@bpy.app.handlers.persistent  # type: ignore[untyped-decorator]
 def _before_save(*_: object) -> None:
     """Store the version of the properties' layout in the file: Blender saves no defaults."""
     for scene in bpy.data.scenes:
@@ -150,7 +148,6 @@ def _before_save(*_: object) -> None:
             scene.seip.version = FILE_VERSION
 
 
-@bpy.app.handlers.persistent  # type: ignore[untyped-decorator]
 def _after_undo(*_: object) -> None:
     """Look soon whether scenes are as they were when they were read: Blender is not ready for work yet."""
     if not bpy.app.timers.is_registered(look_again):
