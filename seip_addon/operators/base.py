@@ -65,6 +65,15 @@ class Conditional:
 
     obstacles: Obstacles = ()
     """Functions that return a reason why the operator is disabled in a scene, or ""."""
+    bl_idname: str
+    bl_label: str
+
+    def __init_subclass__(cls) -> None:
+        """Name an operator by its class: ``SEIP_OT_load_traffic`` is ``seip.load_traffic`` and *Load Traffic*."""
+        name = cls.__name__.removeprefix("SEIP_OT_")
+        if name != cls.__name__:
+            cls.bl_idname = f"seip.{name}"
+            cls.bl_label = vars(cls).get("bl_label", name.replace("_", " ").title())
 
     @classmethod
     def why_not(cls, context: bpy.types.Context) -> str:
@@ -160,8 +169,7 @@ class LongWork(Conditional):
         if session.running is not None:
             raise SeipError("other work is under way: wait for it, or stop it with the button beside its bar")
         self._scene = context.scene.session_uid
-        # of the class, as panels spell it: Blender gives the instance's as SEIP_OT_…
-        name = type(self).bl_idname  # type: ignore[attr-defined]  # of Blender's operators
+        name = type(self).bl_idname  # of the class, as panels spell it: Blender gives the instance's as SEIP_OT_…
         self._job = self.job(context.scene)
         work = Background(next(self._job))
         self._running = session.running = RunningWork(name, work, acceptance=self.acceptance)
@@ -172,9 +180,8 @@ class LongWork(Conditional):
     def _show(self, progress: Progress, duration: str) -> None:
         """Show the line of progress in the status bar, as the sidebar may be closed, and in the sidebar."""
         self._running.shown = (progress, duration)
-        name = type(self).bl_label  # type: ignore[attr-defined]  # of Blender's operators
         line = progress_line(progress, duration)
-        _say(bpy.context, f"{name}: {line} (to stop it: Object ▸ SEIP ▸ Stop, or × in the sidebar)")
+        _say(bpy.context, f"{type(self).bl_label}: {line} (to stop it: Object ▸ SEIP ▸ Stop, or × in the sidebar)")
         _redraw(bpy.context)
 
     def _end(self, context: bpy.types.Context) -> None:
@@ -217,9 +224,6 @@ def _redraw(context: bpy.types.Context) -> None:
 class SEIP_OT_stop(ShortWork, bpy.types.Operator):
     """Stop the work that is under way"""
 
-    bl_idname = "seip.stop"
-    bl_label = "Stop"
-
     obstacles = (lambda _: "nothing is under way" if session.running is None else "",)
 
     def act(self, _context: bpy.types.Context) -> None:
@@ -231,7 +235,6 @@ class SEIP_OT_stop(ShortWork, bpy.types.Operator):
 class SEIP_OT_accept(ShortWork, bpy.types.Operator):
     """End the search with the best placement found so far"""
 
-    bl_idname = "seip.accept"
     bl_label = "Use Best So Far"
 
     obstacles = (lambda _: "" if is_searching() else "no search for a placement is running",)

@@ -48,8 +48,6 @@ def sensors_key(scene: bpy.types.Scene) -> str:
 class SEIP_OT_detect(LongWork, bpy.types.Operator):
     """Scan runs of traffic with the sensors of the scene and detect road users; runs in a separate Python with PyTorch"""  # noqa: E501  # a tooltip is one line
 
-    bl_idname = "seip.detect"
-    bl_label = "Detect"
     stopped_message = "stopped; nothing was written"
 
     obstacles = (why_no_detection,)

@@ -34,7 +34,6 @@ from .results import keep_result
 class SEIP_OT_compare_scene(ForReadyScene, LongWork, bpy.types.Operator):
     """Check whether the placement still matches the scene"""
 
-    bl_idname = "seip.compare_scene"
     bl_label = "Compare with Scene"
     bl_options = {"REGISTER"}  # nothing in the file changes
 
@@ -80,7 +79,6 @@ class _Placing(LongWork):
 class SEIP_OT_solve_placement(ForReadyScene, _Placing, bpy.types.Operator):
     """Choose the best sensors for the number, budget or coverage, and place them in the scene"""
 
-    bl_idname = "seip.solve_placement"
     bl_label = "Place Sensors"
 
     def job(self, scene: bpy.types.Scene) -> Job:
@@ -96,7 +94,6 @@ class SEIP_OT_solve_placement(ForReadyScene, _Placing, bpy.types.Operator):
 class SEIP_OT_judge_placement(_Placing, bpy.types.Operator):
     """Place sensors, and choose among twelve good placements by what a detector finds with them in runs of traffic; runs in a separate Python with PyTorch"""  # noqa: E501  # a tooltip is one line
 
-    bl_idname = "seip.judge_placement"
     bl_label = "Choose by Detection"
 
     obstacles = (scene_status.obstacle, no_python)
@@ -165,7 +162,6 @@ def _searched(
 class SEIP_OT_choose_number(ShortWork, bpy.types.Operator):
     """Make this number of sensors the goal of the next placement; the tick marks the present placement"""
 
-    bl_idname = "seip.choose_number"
     bl_label = "Choose Number of Sensors"
     bl_options = {"REGISTER", "UNDO"}
 
@@ -180,8 +176,6 @@ class SEIP_OT_choose_number(ShortWork, bpy.types.Operator):
 class SEIP_OT_add_rule(ShortWork, bpy.types.Operator):
     """Require or forbid a sensor at the position of the selected pole or sensor, or at the named one"""
 
-    bl_idname = "seip.add_rule"
-    bl_label = "Add Rule"
     bl_options = {"REGISTER", "UNDO"}
 
     rule: bpy.props.EnumProperty(

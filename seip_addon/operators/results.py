@@ -81,7 +81,6 @@ def not_evaluated(scene: bpy.types.Scene) -> str:
 class SEIP_OT_look_from_sensor(ForPlacement, ShortWork, bpy.types.Operator):
     """Look from the sensor that is active in the list towards the road"""
 
-    bl_idname = "seip.look_from_sensor"
     bl_label = "View from Sensor"
 
     def act(self, context: bpy.types.Context) -> None:
@@ -117,8 +116,6 @@ def _middle_of_road(scene: bpy.types.Scene) -> Vector:
 class SEIP_OT_keep_placement(ForPlacement, ShortWork, bpy.types.Operator):
     """Keep the present placement, to compare later ones with it; its name in the list can be changed"""
 
-    bl_idname = "seip.keep_placement"
-    bl_label = "Keep Placement"
     bl_options = {"REGISTER", "UNDO"}
 
     name: bpy.props.StringProperty(name="Name", description="Name of the kept placement; numbered if empty")
@@ -167,7 +164,6 @@ class SEIP_OT_remove_entry(bpy.types.Operator):
 class SEIP_OT_show_comparison(ForPlacement, ShortWork, bpy.types.Operator):
     """Colour the road by the placements that see it: both, only the kept one, only the present one or neither"""
 
-    bl_idname = "seip.show_comparison"
     bl_label = "Show Difference"
     bl_options = {"REGISTER", "UNDO"}
 
@@ -187,7 +183,6 @@ class SEIP_OT_show_comparison(ForPlacement, ShortWork, bpy.types.Operator):
 class SEIP_OT_follow_sensors(ForPlacement, LongWork, bpy.types.Operator):
     """Toggle live coverage while sensors are moved or turned by hand"""
 
-    bl_idname = "seip.follow_sensors"
     bl_label = "Follow Moved Sensors"
     bl_options = {"REGISTER"}
 
@@ -224,9 +219,6 @@ def _set_up(
 
 class SEIP_OT_evaluate_sensors(ForReadyScene, LongWork, bpy.types.Operator):
     """Evaluate the sensors of the scene at their present poses, and make them the placement"""
-
-    bl_idname = "seip.evaluate_sensors"
-    bl_label = "Evaluate Sensors"
 
     obstacles = (
         *ForReadyScene.obstacles,
@@ -290,7 +282,6 @@ def _checked_folder(scene: bpy.types.Scene) -> Path:
 class SEIP_OT_export_result(_Writes, bpy.types.Operator):
     """Write tables, pictures and the scene with its sensors to the folder, replacing earlier ones"""
 
-    bl_idname = "seip.export_result"
     bl_label = "Export"
     stopped_message = "stopped; nothing was written"
 
@@ -333,8 +324,6 @@ def _exported(folder: Path, scene: bpy.types.Scene) -> Generator[Progress, None,
 class SEIP_OT_write_report(_Writes, bpy.types.Operator):
     """Write a report on the placement to the folder, as HTML and PDF; export the placement first if needed"""
 
-    bl_idname = "seip.write_report"
-    bl_label = "Write Report"
     stopped_message = "stopped; no report was written"
 
     def job(self, scene: bpy.types.Scene) -> Job:

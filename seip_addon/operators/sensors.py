@@ -23,8 +23,6 @@ def _no_preferences(_scene: bpy.types.Scene) -> str:
 class SEIP_OT_add_catalogue(ShortWork, bpy.types.Operator):
     """Add a catalogue of your own, which docs/sensors.md describes"""
 
-    bl_idname = "seip.add_catalogue"
-    bl_label = "Add Catalogue"
     obstacles = (_no_preferences,)
 
     filepath: bpy.props.StringProperty(
@@ -54,8 +52,6 @@ class SEIP_OT_add_catalogue(ShortWork, bpy.types.Operator):
 class SEIP_OT_remove_catalogue(ShortWork, bpy.types.Operator):
     """Remove a catalogue of your own from the list; the file stays"""
 
-    bl_idname = "seip.remove_catalogue"
-    bl_label = "Remove Catalogue"
     obstacles = (_no_preferences,)
 
     index: bpy.props.IntProperty(name="Number", description="Index of the catalogue, from 0", min=0)
@@ -72,9 +68,6 @@ class SEIP_OT_remove_catalogue(ShortWork, bpy.types.Operator):
 
 class SEIP_OT_empty_cache(ShortWork, bpy.types.Operator):
     """Delete all stored visibility grids; they are computed again when needed"""
-
-    bl_idname = "seip.empty_cache"
-    bl_label = "Empty Cache"
 
     obstacles = (
         lambda _: "Wait for the work under way" if session.running else "",
@@ -94,9 +87,6 @@ class SEIP_OT_empty_cache(ShortWork, bpy.types.Operator):
 
 class SEIP_OT_preview_beams(ShortWork, bpy.types.Operator):
     """Show or hide the beams of the selected sensor, or else of the sensor shown in the sidebar at the 3D cursor: rings on a flat road and the edges of the vertical field of view"""  # noqa: E501  # a tooltip is one line
-
-    bl_idname = "seip.preview_beams"
-    bl_label = "Preview Beams"
 
     def act(self, context: bpy.types.Context) -> None:
         """Show or hide them."""

@@ -56,9 +56,6 @@ class _WritesScene(Conditional):
 class SEIP_OT_choose_map(_WritesScene, LongWork, bpy.types.Operator):
     """Choose an OpenDRIVE map (.xodr), an extract of OpenStreetMap (.osm, .osm.gz, .osm.pbf) or a site description (.toml), and choose among its junctions"""  # noqa: E501  # a tooltip is one line
 
-    bl_idname = "seip.choose_map"
-    bl_label = "Choose Map"
-
     filepath: bpy.props.StringProperty(
         name="File",
         description="Map, extract or site description",
@@ -120,8 +117,6 @@ def _list_places(site: SEIP_PG_site, source: str, places: SitePlaces) -> None:
 class SEIP_OT_download_map(_WritesScene, LongWork, bpy.types.Operator):
     """Download the streets, buildings and trees around the place from OpenStreetMap, and choose the place there. A download of the same day is used again"""  # noqa: E501  # a tooltip is one line
 
-    bl_idname = "seip.download_map"
-    bl_label = "Download Map"
     stopped_message = "stopped; nothing was downloaded"
 
     obstacles = (
@@ -201,9 +196,6 @@ class _BuildsSite(_WritesScene, LongWork):
 class SEIP_OT_build_site(_BuildsSite, bpy.types.Operator):
     """Build a model of the chosen place, with camera, light and units. It replaces an earlier site of the same place; your own objects stay. If this scene has a site of another place, a new scene is made. Blender's default cube, light and camera are removed if the scene holds nothing else"""  # noqa: E501  # a tooltip is one line
 
-    bl_idname = "seip.build_site"
-    bl_label = "Build Site"
-
     obstacles = (missing_for_build, *_WritesScene.obstacles)
 
     def job(self, scene: bpy.types.Scene) -> Job:
@@ -215,8 +207,6 @@ class SEIP_OT_build_site(_BuildsSite, bpy.types.Operator):
 class SEIP_OT_load_example(_BuildsSite, bpy.types.Operator):
     """Build the junction that comes with SEIP: in this scene, or in a new scene of this file where this one has a site already"""  # noqa: E501  # a tooltip is one line
 
-    bl_idname = "seip.load_example"
-    bl_label = "Load Example"
     is_chosen = False
 
     def job(self, _scene: bpy.types.Scene) -> Job:
@@ -267,7 +257,6 @@ def is_of_choice(scene: bpy.types.Scene) -> bool:
 class SEIP_OT_assign_role(_WritesScene, ShortWork, bpy.types.Operator):
     """Link the selected objects to the collection of a role, or remove them from it; other collections stay"""
 
-    bl_idname = "seip.assign_role"
     bl_label = "Assign"
     bl_options = {"REGISTER", "UNDO"}
 
@@ -298,7 +287,6 @@ class _InObjectMode(_WritesScene):
 class SEIP_OT_add_area(_InObjectMode, ShortWork, bpy.types.Operator):
     """Add a flat area in a role at the 3D cursor; go into Edit Mode to shape it"""
 
-    bl_idname = "seip.add_area"
     bl_label = "Draw Area"
     bl_options = {"REGISTER", "UNDO"}
 
@@ -331,9 +319,6 @@ class SEIP_OT_add_area(_InObjectMode, ShortWork, bpy.types.Operator):
 
 class SEIP_OT_check_site(LongWork, bpy.types.Operator):
     """Count the objects by role, and list problems that prevent a placement or make it wrong"""
-
-    bl_idname = "seip.check_site"
-    bl_label = "Check Site"
 
     def job(self, scene: bpy.types.Scene) -> Job:
         """Check the scene as it is now, and hold what was found."""
@@ -369,7 +354,6 @@ def in_short(problems: Iterable[Problem]) -> str:
 class SEIP_OT_show_problem(_InObjectMode, ShortWork, bpy.types.Operator):
     """Select the object with the problem, and bring it into view"""
 
-    bl_idname = "seip.show_problem"
     bl_label = "Show Object"
     bl_options = {"REGISTER", "UNDO"}
 

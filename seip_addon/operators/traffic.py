@@ -57,9 +57,6 @@ def why_no_scan(scene: bpy.types.Scene) -> str:
 class SEIP_OT_load_traffic(LongWork, bpy.types.Operator):
     """Read the traffic file and animate its road users on the road"""
 
-    bl_idname = "seip.load_traffic"
-    bl_label = "Load Traffic"
-
     obstacles = (why_no_load,)
 
     def job(self, scene: bpy.types.Scene) -> Job:
@@ -83,8 +80,6 @@ def show_traffic(scene: bpy.types.Scene, trajectories: Trajectories, warnings: S
 class SEIP_OT_clear_traffic(ShortWork, bpy.types.Operator):
     """Remove the loaded road users from the scene; your own objects stay"""
 
-    bl_idname = "seip.clear_traffic"
-    bl_label = "Clear Traffic"
     bl_options = {"REGISTER", "UNDO"}
 
     obstacles = (lambda scene: "" if contract.find(scene, contract.TRAFFIC) else "there is no traffic in the scene",)
@@ -100,7 +95,6 @@ class SEIP_OT_clear_traffic(ShortWork, bpy.types.Operator):
 class SEIP_OT_scan_frame(LongWork, bpy.types.Operator):
     """Show the point cloud of the placed sensors at the current frame"""
 
-    bl_idname = "seip.scan_frame"
     obstacles = (why_no_scan,)
     bl_label = "Scan This Frame"
     bl_options = {"REGISTER"}  # nothing in the file changes
@@ -129,9 +123,7 @@ def _scanned(
 class SEIP_OT_write_dataset(LongWork, bpy.types.Operator):
     """Scan all frames and write them with the boxes of all road users, as datasets for training detectors"""
 
-    bl_idname = "seip.write_dataset"
     obstacles = (why_no_scan,)
-    bl_label = "Write Dataset"
     bl_options = {"REGISTER"}  # as above
     stopped_message = "stopped; what is written stays, and the same run goes on from there"
 
@@ -170,7 +162,6 @@ def _run_of(scene: bpy.types.Scene) -> Generator[Progress, None, Run]:
 class SEIP_OT_install_sumo(LongWork, bpy.types.Operator):
     """Download Eclipse SUMO from PyPI into the extension's own folder, where it takes up to 470 MB. It lays out the streets of an extract of OpenStreetMap and simulates traffic"""  # noqa: E501  # a tooltip is one line
 
-    bl_idname = "seip.install_sumo"
     bl_label = "Install SUMO"
     bl_options = {"REGISTER"}  # nothing in the file changes
     stopped_message = "stopped; SUMO was not installed"
@@ -202,8 +193,6 @@ def why_no_simulation(scene: bpy.types.Scene) -> str:
 class SEIP_OT_simulate_traffic(LongWork, bpy.types.Operator):
     """Simulate runs of traffic on the map of the site with SUMO, put the first on the road, and use all for Detection and for placements in traffic"""  # noqa: E501  # a tooltip is one line
 
-    bl_idname = "seip.simulate_traffic"
-    bl_label = "Simulate Traffic"
     stopped_message = "stopped; no run was written"
 
     obstacles = (why_no_simulation,)

@@ -72,7 +72,6 @@ def _folder_of(scene: bpy.types.Scene) -> Path:
 class SEIP_OT_verify(LongWork, bpy.types.Operator):
     """Compare the installed sensors with the plan by a recording: poses, changes and coverage"""
 
-    bl_idname = "seip.verify"
     bl_label = "Verify Installation"
     bl_options = {"REGISTER", "UNDO"}  # the scene keeps what was found, also when a correction is undone
     stopped_message = "stopped; nothing was written"
@@ -124,7 +123,6 @@ def _verified(
 class SEIP_OT_correct_scene(ShortWork, bpy.types.Operator):
     """Add new objects as boxes, remove those that are gone, and move the sensors to their installed poses"""
 
-    bl_idname = "seip.correct_scene"
     bl_label = "Add to Scene"
     bl_options = {"REGISTER", "UNDO"}
 

@@ -37,8 +37,6 @@ def why_no_coverage(scene: bpy.types.Scene) -> str:
 class SEIP_OT_colour_coverage(ShortWork, bpy.types.Operator):
     """Colour the coverage on the road, with a legend; a Solid view is set to show the colours"""
 
-    bl_idname = "seip.colour_coverage"
-    bl_label = "Colour Coverage"
     bl_options = {"REGISTER", "UNDO"}
 
     aspect: bpy.props.EnumProperty(
@@ -67,8 +65,6 @@ class SEIP_OT_colour_coverage(ShortWork, bpy.types.Operator):
 class SEIP_OT_show_sight_lines(ForPlacement, LongWork, bpy.types.Operator):
     """Draw lines from the sensor that is active in the list to the targets that it sees, and squares on those in its range that it does not see"""  # noqa: E501  # a tooltip is one line
 
-    bl_idname = "seip.show_sight_lines"
-    bl_label = "Show Sight Lines"
     bl_options = {"REGISTER"}  # nothing in the file changes
 
     def job(self, scene: bpy.types.Scene) -> Job:
@@ -90,7 +86,6 @@ class SEIP_OT_show_sight_lines(ForPlacement, LongWork, bpy.types.Operator):
 class SEIP_OT_hide_overlay(ShortWork, bpy.types.Operator):
     """Hide these points or lines"""
 
-    bl_idname = "seip.hide_overlay"
     bl_label = "Hide"
 
     name: bpy.props.StringProperty(name="Name", description="Name of the overlay")
@@ -105,8 +100,6 @@ class SEIP_OT_hide_overlay(ShortWork, bpy.types.Operator):
 class SEIP_OT_save_picture(ForPlacement, LongWork, bpy.types.Operator):
     """Write a view of the placement with its legend, and the plan beside it, as one PNG"""
 
-    bl_idname = "seip.save_picture"
-    bl_label = "Save Picture"
     bl_options = {"REGISTER"}  # nothing in the file changes
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Outcome:
