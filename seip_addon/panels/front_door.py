@@ -10,7 +10,6 @@ from ..operators.site import EXTRACTS
 class SEIP_FH_map(bpy.types.FileHandler):
     """A map or an extract that is dropped into a 3D view; Blender matches only the last suffix of a name."""
 
-    bl_idname = "SEIP_FH_map"
     bl_label = "OpenDRIVE or OpenStreetMap"
     bl_import_operator = "seip.choose_map"
     bl_file_extensions = ".xodr;.osm;.gz"
@@ -24,7 +23,6 @@ class SEIP_FH_map(bpy.types.FileHandler):
 class SEIP_MT_main(bpy.types.Menu):
     """Menu with the operators of the sidebar, by name."""
 
-    bl_idname = "SEIP_MT_main"
     bl_label = "SEIP"
 
     def draw(self, _context: bpy.types.Context) -> None:
@@ -63,7 +61,7 @@ def draw_add(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
 
 def draw_object(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
     """Draw what the menu Object gets."""
-    menu.layout.menu(SEIP_MT_main.bl_idname)
+    menu.layout.menu(SEIP_MT_main.__name__)
 
 
 MENUS = (("TOPBAR_MT_file_import", draw_import), ("VIEW3D_MT_add", draw_add), ("VIEW3D_MT_object", draw_object))

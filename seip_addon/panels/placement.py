@@ -40,8 +40,6 @@ NUMBER_SHARE = 0.3
 class SEIP_UL_rules(RowList, bpy.types.UIList):
     """Positions with a demand of their own."""
 
-    bl_idname = "SEIP_UL_rules"
-
     def draw_row(self, layout: bpy.types.UILayout, item: bpy.types.PropertyGroup) -> None:
         """Draw a position and what must be there."""
         row = layout.row()
@@ -149,7 +147,7 @@ def _draw_rules(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
     if len(goal.rules):
         row = layout.row()
         rows = len(goal.rules)
-        row.template_list(SEIP_UL_rules.bl_idname, "", goal, "rules", goal, "active_rule", rows=rows, maxrows=rows)
+        row.template_list(SEIP_UL_rules.__name__, "", goal, "rules", goal, "active_rule", rows=rows, maxrows=rows)
         row.operator("seip.remove_entry", text="", icon="REMOVE").of = "RULES"
     layout.prop(goal, "position", text="", icon="VIEWZOOM", placeholder="Position, or the selected pole")
     row = layout.row(align=True)

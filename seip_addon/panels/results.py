@@ -86,8 +86,6 @@ SENSOR_SHARE = 0.72
 class SEIP_UL_chosen(RowList, bpy.types.UIList):
     """The sensors of the placement."""
 
-    bl_idname = "SEIP_UL_chosen"
-
     def draw_row(self, layout: bpy.types.UILayout, item: bpy.types.PropertyGroup) -> None:
         """Draw a sensor: label, height, product if there are several, position, and what it sees."""
         record = parsed_record(bpy.context.scene.seip.result.record)
@@ -105,8 +103,6 @@ class SEIP_UL_chosen(RowList, bpy.types.UIList):
 
 class SEIP_UL_kept(RowList, bpy.types.UIList):
     """Placements that were kept."""
-
-    bl_idname = "SEIP_UL_kept"
 
     def draw_row(self, layout: bpy.types.UILayout, item: bpy.types.PropertyGroup) -> None:
         """Draw a name that can be changed."""
@@ -145,7 +141,7 @@ def _draw_list(
 ) -> None:
     """Draw a list with all its rows: a list that scrolls would take the mouse wheel from the sidebar."""
     rows = max(1, len(getattr(owner, items)))
-    layout.template_list(kind.bl_idname, "", owner, items, owner, active, rows=rows, maxrows=rows)
+    layout.template_list(kind.__name__, "", owner, items, owner, active, rows=rows, maxrows=rows)
 
 
 def _draw_followed(layout: bpy.types.UILayout, following: FollowedSensors) -> None:
