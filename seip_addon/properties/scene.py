@@ -91,6 +91,14 @@ class SEIP_PG_verification(bpy.types.PropertyGroup):
     )
 
 
+def _recolour(own: bpy.types.PropertyGroup, _context: object) -> None:
+    last_scan.show_cloud(own.id_data)
+
+
+def _show_legend(own: bpy.types.PropertyGroup, _context: object) -> None:
+    coverage.update(own.id_data)
+
+
 class SEIP_PG_view(bpy.types.PropertyGroup):
     """Display settings of the results."""
 
@@ -98,7 +106,7 @@ class SEIP_PG_view(bpy.types.PropertyGroup):
         name="Legend",
         description="Show the legend of the coverage colours, and the sensors' labels",
         default=True,
-        update=lambda own, _: coverage.update(own.id_data),
+        update=_show_legend,
     )
     cloud_colour: EnumProperty(
         name="Point Colours",
@@ -108,7 +116,7 @@ class SEIP_PG_view(bpy.types.PropertyGroup):
             ("intensity", "Intensity", "Intensity of the return"),
             ("instance", "Road User", "Road user that the point is on"),
         ),
-        update=lambda own, _: last_scan.show_cloud(own.id_data),
+        update=_recolour,
     )
     picture: path_property(
         "Picture",
