@@ -23,6 +23,7 @@ from ..core.workflows.placing import place, with_context
 from ..core.workflows.survey import Layout
 from ..core.workflows.traffic_runs import TrafficRuns, found_runs, read_runs
 from ..properties.conversion import runs_folder, saved_path
+from ..properties.placement import RULE_ITEMS
 from ..scene.write import write_result
 from ..session import SceneState, scene_of, session
 from ..viewport import coverage, overlays, search
@@ -178,11 +179,7 @@ class SEIP_OT_add_rule(ShortWork, bpy.types.Operator):
 
     bl_options = {"REGISTER", "UNDO"}
 
-    rule: bpy.props.EnumProperty(
-        name="Rule",
-        description="Requirement at the position",
-        items=(("MANDATORY", "Sensor", "There must be a sensor"), ("FORBIDDEN", "No sensor", "There must be none")),
-    )
+    rule: bpy.props.EnumProperty(name="Rule", description="Requirement at the position", items=RULE_ITEMS)
 
     def act(self, context: bpy.types.Context) -> None:
         """Add it, or change the one that is there."""

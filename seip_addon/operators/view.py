@@ -26,6 +26,13 @@ from ..viewport.sight_lines import sight_overlay
 from .base import Job, LongWork, Outcome, ShortWork
 from .results import ForPlacement, active_sensor, not_evaluated
 
+ASPECTS = (
+    ("returns", "Returns", "Expected returns from a pedestrian, if sensors were placed for returns"),
+    ("seen", "Seen", "Road surface that some sensor measures"),
+    ("times", "Sensors", "Number of sensors that measure the road surface"),
+    ("weights", "Weights", "Weight of each part of the road, if regions are weighted"),
+)
+"""Meanings of the road's colours, with their names and descriptions."""
 NO_COVERAGE = "There is no coverage to show: place sensors first."
 
 
@@ -42,12 +49,7 @@ class SEIP_OT_colour_coverage(ShortWork, bpy.types.Operator):
     aspect: bpy.props.EnumProperty(
         name="Show",
         description="Meaning of the road's colours",
-        items=(
-            ("returns", "Returns", "Expected returns from a pedestrian, if sensors were placed for returns"),
-            ("seen", "Seen", "Road surface that some sensor measures"),
-            ("times", "Sensors", "Number of sensors that measure the road surface"),
-            ("weights", "Weights", "Weight of each part of the road, if regions are weighted"),
-        ),
+        items=ASPECTS,
         default="times",
     )
 

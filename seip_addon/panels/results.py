@@ -6,12 +6,11 @@ import bpy
 
 from .. import last_scan
 from ..core.choosing.placement.returns_summary import SURFACE_SEEN, returns_text
-from ..core.output.pictures.colours import Aspect
 from ..core.output.results.placement_record import PlacementRecord, parsed_record
 from ..core.sensing.lidar.model import short_name
 from ..operators import results
 from ..operators.results import no_placement
-from ..operators.view import why_no_coverage
+from ..operators.view import ASPECTS, why_no_coverage
 from ..properties.conversion import complaint
 from ..scene.write import ASPECT, aspects_of, coverage_of
 from ..sensor_edits import sensor_edits
@@ -22,9 +21,6 @@ from . import placement
 from .sections import Status, draw_sections
 from .sidebar import RowList, draw_reason, draw_run
 from .wrapped_text import draw_sentence
-
-ASPECTS: dict[Aspect, str] = {"returns": "Returns", "seen": "Seen", "times": "Sensors", "weights": "Weights"}
-"""What the buttons of the colours say."""
 
 
 def draw_view(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
@@ -46,13 +42,11 @@ def _draw_coverage(layout: bpy.types.UILayout, context: bpy.types.Context) -> No
     head.prop(context.scene.seip.view, "legend", text="", icon="INFO")
     obj = coverage_of(context.scene)
     row = column.row(align=True)
-    possible = ASPECTS if obj is None else aspects_of(obj)
-    for aspect, words in ASPECTS.items():
-        if aspect not in possible:
-            continue
-        now = obj is not None and obj.get(ASPECT) == aspect
-        button = row.operator("seip.colour_coverage", text=words, depress=now)
-        button.aspect = aspect
+    possible = tuple(aspect for aspect, _, _ in ASPECTS) if obj is None else aspects_of(obj)
+    for aspect, words, _ in ASPECTS:
+        if aspect in possible:
+            now = obj is not None and obj.get(ASPECT) == aspect
+            row.operator("seip.colour_coverage", text=words, depress=now).aspect = aspect
     if obj is not None and "returns" in possible and obj.get(ASPECT) in {"seen", "times"}:
         draw_sentence(column, SURFACE_SEEN, icon="INFO")
     if not draw_reason(column, why_no_coverage(context.scene)) and not coverage.shows_coverage(context.space_data):

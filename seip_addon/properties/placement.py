@@ -13,15 +13,13 @@ from ..core.choosing.placement.scenarios import Scenarios
 from ..core.sensing.scenarios.pose_errors import MAX_ANGLE_STD, PoseErrors
 from .conversion import as_typed, of_setting
 
+RULE_ITEMS = (("MANDATORY", "Sensor", "There must be a sensor"), ("FORBIDDEN", "No sensor", "There must be none"))
+
 
 class SEIP_PG_position_rule(bpy.types.PropertyGroup):
     """A position with a demand of its own; its name is the position's."""
 
-    rule: EnumProperty(
-        name="Rule",
-        description="Requirement at this position",
-        items=(("MANDATORY", "Sensor", "There must be a sensor"), ("FORBIDDEN", "No sensor", "There must be none")),
-    )
+    rule: EnumProperty(name="Rule", description="Requirement at this position", items=RULE_ITEMS)
 
 
 class SEIP_PG_goal(bpy.types.PropertyGroup):
