@@ -137,9 +137,9 @@ def survey(
     check(layout)
     file = options.output / "visibility.npz"
     if objective is not None:
-        best = watch.run("early answer", early_answer(layout, objective, file))
-        if best:
-            LOG.info("early answer from a few poses: %s", best)
+        early = watch.run("early answer", early_answer(layout, objective, file))
+        if early.best:
+            LOG.info("early answer from a few poses: %s", early.best)
     surveyed = watch.run("visibility", see(layout, file, options.scheduler))
     LOG.info(culling_message(surveyed.grid.parameters["triangles"]))
     return surveyed, watch

@@ -1,33 +1,25 @@
 """Last scan of each scene, shown as a point cloud."""
 
 import time
+from collections.abc import Sequence
 
 import bpy
 import numpy as np
 
-from .core.arrays import Float
+from .core.output.pictures.colours import By, cloud_colours, sensor_colour, strength_ramp
+from .core.output.pictures.palette import MAX_INTENSITY, STATIC_COLOUR, rgb
+from .core.sensing.scans.frame import Frame
 from .core.sensing.scans.run_folder import Run
+from .core.sensing.scans.sensor import MountedSensor
 from .core.sensing.scans.simulation import Simulation
-from .core.sensing.traffic.source import TrafficFiles
-from .core.sensing.traffic.trajectories import Trajectories
 from .core.workflows.recording import frame_number
+from .overlay import Block, Colour, Entry, Layer, Overlay
 from .session import LastScan, session
 from .viewport import overlays
-from .viewport.point_cloud import NAME, cloud_overlay
 
-
-def known_traffic(scene: bpy.types.Scene, files: TrafficFiles, origin: Float) -> Trajectories | None:
-    """Return the traffic of files that were read before and are still the same, None otherwise."""
-    own = session.of(scene).traffic
-    if own is None or (own.files, own.changed) != (files, changes(files)):
-        return None
-    return own.trajectories if np.array_equal(own.trajectories.origin, origin) else None
-
-
-def changes(files: TrafficFiles) -> tuple[float, ...]:
-    """Return when each of the files was last written; 0 for one that is not there."""
-    paths = (files.path, *files.routes, *([files.net] if files.net else []))
-    return tuple(path.stat().st_mtime if path.is_file() else 0.0 for path in paths)
+NAME = "point cloud"
+RAMP_STEPS = 8
+POINT_SIZE = 2.0  # pixels, at the interface's usual scale
 
 
 def now(scene: bpy.types.Scene) -> float:
@@ -59,3 +51,29 @@ def hide_cloud(scene: bpy.types.Scene) -> None:
     """Let go of a scene's scan."""
     session.of(scene).scan = None
     overlays.hide(scene, NAME)
+
+
+def cloud_overlay(frame: Frame, sensors: Sequence[MountedSensor], by: By) -> Overlay:
+    """Return a frame's points, coloured by sensor, intensity or instance."""
+    layer = Layer("POINTS", np.ascontiguousarray(frame.points), cloud_colours(frame, by), POINT_SIZE)
+    block = Block(f"{len(frame):,} points at {frame.time:.2f} s", _entries(frame, sensors, by))
+    return Overlay((layer,), lambda _scene: block)
+
+
+def _entries(frame: Frame, sensors: Sequence[MountedSensor], by: By) -> tuple[Entry, ...]:
+    if by == "sensor":
+        counts = np.bincount(frame.sensor, minlength=len(sensors))
+        return tuple(
+            Entry(f"{sensor.label}  {sensor.model.key}  {count:,}", (_opaque(rgb(sensor_colour(number))),))
+            for number, (sensor, count) in enumerate(zip(sensors, counts.tolist(), strict=True))
+        )
+    if by == "intensity":
+        ramp = tuple(_opaque(colour) for colour in strength_ramp(np.linspace(0.0, 1.0, RAMP_STEPS)).tolist())
+        return (Entry(f"intensity 0 to {MAX_INTENSITY:g} and more", ramp),)
+    users = tuple(_opaque(colour) for colour in ((1.0, 0.4, 0.4), (0.4, 1.0, 0.6), (0.4, 0.6, 1.0)))
+    return (Entry("one colour for each road user", users), Entry("standing still", (_opaque(rgb(STATIC_COLOUR)),)))
+
+
+def _opaque(colour: Sequence[float]) -> Colour:
+    red, green, blue = colour
+    return red, green, blue, 1.0

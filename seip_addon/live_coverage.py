@@ -1,10 +1,8 @@
 """Live coverage: computed again whenever a sensor is moved.
 
 A handler notes that something moved; a timer, a moment later, casts the rays of
-only those sensors and colours the road again. Nothing runs while this is off.
+only those sensors and colours the road again.
 """
-
-from collections.abc import Callable
 
 import bpy
 import numpy as np
@@ -34,18 +32,12 @@ def start(
     _, solution = state.placed()
     known = _as_placed(solution.deployment, returns)
     session.following = FollowedSensors(scene.session_uid, state, visibility, returns, known)
-    for event, handler in _handlers():
-        getattr(bpy.app.handlers, event).append(handler)
     update()
 
 
 def stop() -> None:
     """Stop updating coverage for moved sensors."""
-    if session.following is None:
-        return
     session.following = None
-    for event, handler in _handlers():
-        getattr(bpy.app.handlers, event).remove(handler)
     if bpy.app.timers.is_registered(update):
         bpy.app.timers.unregister(update)
 
@@ -79,18 +71,11 @@ def _update(followed: FollowedSensors, scene: bpy.types.Scene) -> None:
     mounted, rows, returns = zip(*followed.sensors.values(), strict=True) if followed.sensors else ((), (), ())
     seen_by: Integer = np.sum(rows, axis=0, dtype=np.int64)
     followed.coverage = float(np.count_nonzero(seen_by)) / len(seen_by)
-    followed.moved = _moved(followed, sensors)
     pedestrians = None
     if followed.returns is not None:
         followed.summary = followed.returns.summary(mounted, returns)
         pedestrians = followed.returns.near_targets(returns)
     show_seen_by(scene, seen_by, pedestrians)
-
-
-def _moved(followed: FollowedSensors, sensors: dict[str, MountedSensor]) -> tuple[str, ...]:
-    solution = followed.state.solution
-    placed = {} if solution is None else {sensor.label: sensor for sensor in solution.deployment.sensors}
-    return tuple(label for label, sensor in sensors.items() if label not in placed or not _same(sensor, placed[label]))
 
 
 def _as_placed(
@@ -107,7 +92,6 @@ def _same(one: MountedSensor, other: MountedSensor) -> bool:
     return same_pose((one.xyz, one.orientation), (other.xyz, other.orientation)) and one.model.key == other.model.key
 
 
-@bpy.app.handlers.persistent  # type: ignore[untyped-decorator]
 def _on_update(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     """Have a look soon where a sensor moved, came or went; never at once, as looking changes the scene."""
     if (
@@ -123,10 +107,9 @@ def _on_update(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
         _update_soon()
 
 
-@bpy.app.handlers.persistent  # type: ignore[untyped-decorator]
 def _on_undo(*_: object) -> None:
     """Have a look at what an undo or redo brought back: Blender names no object."""
-    if not bpy.app.timers.is_registered(update):
+    if session.following is not None and not bpy.app.timers.is_registered(update):
         _update_soon()
 
 
@@ -134,8 +117,5 @@ def _update_soon() -> None:
     bpy.app.timers.register(update, first_interval=DELAY)
 
 
-def _handlers() -> tuple[tuple[str, Callable[..., None]], ...]:
-    return (("depsgraph_update_post", _on_update), ("undo_post", _on_undo), ("redo_post", _on_undo))
-
-
+HANDLERS = (("depsgraph_update_post", _on_update), ("undo_post", _on_undo), ("redo_post", _on_undo))
 forget = stop  # another file is opened, or the add-on is disabled

@@ -7,7 +7,6 @@ import bpy
 from .scene.pieces import copied_pieces, loose_pieces, tidy_pieces
 
 
-@bpy.app.handlers.persistent  # type: ignore[untyped-decorator]
 def _on_update(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     """Note that something came loose: what is deleted from within a handler brings Blender down."""
     objects = [update.id.original for update in depsgraph.updates if isinstance(update.id, bpy.types.Object)]

@@ -17,8 +17,6 @@ Label = tuple[str, tuple[float, ...]]
 
 Kind = Literal["POINTS", "LINES", "TRIS"]
 
-POINT_SIZE = 2.0  # pixels, at the interface's usual scale
-
 
 @dataclass(frozen=True)
 class Entry:
@@ -46,18 +44,21 @@ class Layer:
     positions : (n, 3) float32, metres
         One, two or three for each.
     colours : (n, 4) float32, or one colour for all
-        sRGB and opacity.
+        sRGB and opacity; lines have one.
+    size : float, pixels at the interface's usual scale
+        Of points, and the width of lines.
     """
 
     kind: Kind
     positions: NDArray[np.float32]
     colours: NDArray[np.float32] | Colour
+    size: float = 1.0
     _batch: Any = field(default=None, repr=False)
 
     def draw(self, scale: float) -> None:
         """Draw it into the framebuffer that is bound."""
         single = isinstance(self.colours, tuple)
-        prefix = "POINT_" if self.kind == "POINTS" else ""
+        prefix = {"POINTS": "POINT_", "LINES": "POLYLINE_", "TRIS": ""}[self.kind]
         shader = gpu.shader.from_builtin(f"{prefix}{'UNIFORM' if single else 'FLAT'}_COLOR")
         if self._batch is None:
             content = {"pos": self.positions} if single else {"pos": self.positions, "color": self.colours}
@@ -66,12 +67,11 @@ class Layer:
         if single:
             shader.uniform_float("color", self.colours)
         if self.kind == "POINTS":
-            shader.uniform_float("size", POINT_SIZE * scale)
+            shader.uniform_float("size", self.size * scale)
+        elif self.kind == "LINES":
+            shader.uniform_float("lineWidth", self.size * scale)
+            shader.uniform_float("viewportSize", gpu.state.viewport_get()[2:])
         self._batch.draw(shader)
-
-
-def _no_labels(_scene: bpy.types.Scene) -> list[Label]:
-    return []
 
 
 @dataclass(frozen=True)
@@ -84,11 +84,11 @@ class Overlay:
         From the scene to the block that explains the layers; called as the view is drawn, so it only reads.
     labels : callable
         From the scene to the labels that belong to it; called as the view is drawn.
-    about : str
-        What the panel calls it: a sensor's label.
+    moving : callable
+        To layers that follow the scene; called as the view is drawn.
     """
 
     layers: Sequence[Layer]
     legend: Callable[[bpy.types.Scene], Block | None]
-    about: str = ""
-    labels: Callable[[bpy.types.Scene], list[Label]] = _no_labels
+    labels: Callable[[bpy.types.Scene], Sequence[Label]] = lambda _scene: ()
+    moving: Callable[[], Sequence[Layer]] = tuple

@@ -7,6 +7,7 @@ import sys
 from functools import lru_cache
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Any, TypeVar
 
 import bpy
 
@@ -19,6 +20,8 @@ from .core.sumo_programs import Sumo, find_sumo, sumo_version
 from .core.workflows.detection import DetectingPython
 from .core.world.openstreetmap.overpass import EXPORT, OVERPASS, OverpassServer
 
+Value = TypeVar("Value")
+
 ADDON_ID = (__package__ or "").removesuffix(".seip_addon")
 """The extension's key among Blender's add-ons: not that of the package in it."""
 NO_SUMO = "SUMO is missing, which lays out the streets of an extract and simulates traffic"
@@ -29,10 +32,8 @@ NO_PIP = f"This Blender has no pip to install SUMO with: {BY_HAND}"
 
 def cache_folder() -> Path:
     """Return the folder in which visibility is kept."""
-    preferences = own()
-    if preferences is not None and preferences.cache:
-        return Path(bpy.path.abspath(preferences.cache))
-    return _own_folder("visibility")
+    named = _given("cache", "")
+    return Path(bpy.path.abspath(named)) if named else _own_folder("visibility")
 
 
 def _own_folder(name: str) -> Path:
@@ -44,9 +45,8 @@ def _own_folder(name: str) -> Path:
 
 def detecting_python() -> DetectingPython | None:
     """Return the Python that detection runs in, or None where nobody has named one and this one cannot be it."""
-    preferences = own()
-    if preferences is not None and preferences.python:
-        program = Path(bpy.path.abspath(preferences.python)).absolute()  # not resolved: .venv/bin/python is a link
+    if named := _given("python", ""):
+        program = Path(bpy.path.abspath(named)).absolute()  # not resolved: .venv/bin/python is a link
         return DetectingPython(program, program.parent.parent.parent)
     project = find_spec("headless")
     if bpy.app.module and project is not None and project.origin is not None and find_spec("torch") is not None:
@@ -56,8 +56,7 @@ def detecting_python() -> DetectingPython | None:
 
 def sumo_folders() -> tuple[Path, ...]:
     """Return the folders that are searched for SUMO first: the one in the preferences, then the extension's own."""
-    preferences = own()
-    named = preferences.sumo if preferences is not None else ""
+    named = _given("sumo", "")
     return (*((Path(bpy.path.abspath(named)),) if named else ()), installed_sumo(own_sumo_folder()))
 
 
@@ -114,21 +113,17 @@ def why_no_download() -> str:
 
 def overpass() -> OverpassServer:
     """Return the server that extracts are downloaded from; without one of the user's own the public one."""
-    preferences = own()
-    address = OVERPASS if preferences is None else preferences.overpass or OVERPASS
-    return OverpassServer(_own_folder("openstreetmap"), address, why_no_download())
+    return OverpassServer(_own_folder("openstreetmap"), _given("overpass", "") or OVERPASS, why_no_download())
 
 
 def cores() -> int | None:
     """Return the number of threads for visibility, or None if it is not set."""
-    preferences = own()
-    return None if preferences is None else preferences.cores
+    return _given("cores", None)
 
 
 def catalogue_files() -> tuple[Path, ...]:
     """Return the user's own catalogues."""
-    preferences = own()
-    files = () if preferences is None else preferences.catalogues
+    files: Any = _given("catalogues", ())
     return tuple(Path(bpy.path.abspath(file.path)) for file in files if file.path)
 
 
@@ -137,40 +132,18 @@ def catalogue() -> dict[str, LidarModel]:
     return load_catalogue(catalogue_files())
 
 
-def add_catalogue(path: str) -> None:
-    """Keep the name of a catalogue, where the add-on has preferences."""
-    _files().add().path = path
-    bpy.context.preferences.is_dirty = True
-
-
-def remove_catalogue(number: int) -> None:
-    """Forget a catalogue.
-
-    Raises
-    ------
-    SeipError
-        There is none of that number.
-    """
-    files = _files()
-    if number >= len(files):
-        raise SeipError(f"there is no catalogue {number}: there are {len(files)}, counted from 0")
-    files.remove(number)
-    bpy.context.preferences.is_dirty = True
-
-
-def _files() -> bpy.types.bpy_prop_collection:
-    preferences = own()
-    if preferences is None:
-        raise SeipError("the add-on has no preferences to keep catalogues in: install it as an extension")
-    return preferences.catalogues
-
-
 def kept_visibility() -> GridFolder:
     """Return the visibility that is kept from run to run."""
     return GridFolder(cache_folder())
 
 
-def own() -> bpy.types.AddonPreferences | None:
+def own() -> Any:  # noqa: ANN401  # the properties of Blender's class are not known to types
     """Return the add-on's preferences; None where it was not enabled as an add-on."""
     add_on = bpy.context.preferences.addons.get(ADDON_ID)
     return None if add_on is None else add_on.preferences
+
+
+def _given(name: str, otherwise: Value) -> Value:
+    """Return a preference, or another value where the add-on has none."""
+    value: Value = getattr(own(), name, otherwise)
+    return value

@@ -10,13 +10,13 @@ import bpy
 PARTS = (
     "panels.preferences",
     "properties.site", "properties.survey", "properties.placement",
-    "properties.traffic", "properties.simulation",
+    "properties.traffic",
     "properties.sections", "properties.scene",
     "session", "scene_survey", "sensor_types", "loose_pieces",
-    "viewport.beam_preview", "viewport.overlays", "viewport.coverage",
+    "viewport.overlays", "viewport.coverage",
     "operators.base", "operators.site", "operators.street_map",
     "operators.sensors", "operators.placement", "live_coverage",
-    "operators.results", "operators.view", "operators.traffic", "operators.simulation", "operators.detection",
+    "operators.results", "operators.view", "operators.traffic", "operators.detection",
     "operators.verification",
     "panels.sensors", "panels.site", "panels.placement", "panels.results", "panels.steps", "panels.front_door",
 )  # fmt: skip
@@ -81,7 +81,11 @@ def _detach(part: ModuleType) -> None:
 
 def _lists(part: ModuleType) -> Iterator[tuple[Any, Callable[..., None]]]:
     """Yield Blender's lists of handlers, and its menus, with the functions that a module has for them."""
-    yield from ((getattr(bpy.app.handlers, event), function) for event, function in getattr(part, "HANDLERS", ()))
+    for event, function in getattr(part, "HANDLERS", ()):
+        yield (
+            getattr(bpy.app.handlers, event),
+            bpy.app.handlers.persistent(function),
+        )  # also after another file is opened
     yield from ((getattr(bpy.types, menu), function) for menu, function in getattr(part, "MENUS", ()))
 
 

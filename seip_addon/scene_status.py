@@ -11,7 +11,6 @@ import bpy
 
 from .core.errors import SeipError
 from .core.output.results.placement_record import parsed_record
-from .core.site.candidates import CandidateSettings
 from .core.workflows.survey_settings import SurveySettings
 from .scene import contract
 from .scene.sensors import labelled_sensors
@@ -26,7 +25,6 @@ NOT_COMPARED = "Not compared with the scene since the file was opened."
 ANOTHER_SITE = "The scene or its settings have changed since this placement: place again."
 NO_SITE = "There is no site yet."
 UNEVALUATED = "There are sensors without figures in the scene: evaluate them."
-OLD_CHECK = "Checked before the file was opened: check again."
 OTHER_SENSORS = "The sensors or their heights have changed since: check again to count their poses."
 
 
@@ -72,7 +70,7 @@ def next_step(scene: bpy.types.Scene) -> str:
         return _next_for_site(scene.seip.site)
     if has_unevaluated(scene):
         return "seip.evaluate_sensors"
-    if not scene.seip.site.checked:
+    if session.of(scene).check is None:
         return "seip.check_site"
     return "seip.solve_placement" if scene.seip.survey.used_types() else "seip.choose_sensors"
 
@@ -107,11 +105,10 @@ def stale_survey(scene: bpy.types.Scene) -> str:
         return ""
     if state.watch.changed:
         return "The scene has changed since it was computed."
-    try:
-        same = same_grid(scene.seip.survey.settings(), state.layout.settings)
-    except SeipError as error:
-        return str(error)
-    return "" if same else "The settings have changed since it was computed."
+    settings = survey_settings(scene)
+    if isinstance(settings, str):
+        return settings
+    return "" if same_grid(settings, state.layout.settings) else "The settings have changed since it was computed."
 
 
 def stale_placement(scene: bpy.types.Scene) -> str:
@@ -133,44 +130,35 @@ def other_goal(scene: bpy.types.Scene) -> str:
 
 
 def stale_check(scene: bpy.types.Scene) -> str:
-    """Return why the scene's check is not of the scene as it is, in a sentence; empty if it is."""
+    """Return why the scene's check is not of the scene as it is, in a sentence; empty if it is, or without a check."""
     check = session.of(scene).check
     if check is None:
-        return OLD_CHECK
+        return ""
     if check.watch.changed:
         return "The scene has changed since the check."
-    settings = checked_settings(scene)
-    if check.settings == settings:
+    settings = survey_settings(scene)
+    if same_grid(check.settings, settings):
         return ""
-    return (
-        OTHER_SENSORS
-        if _of_site(check.settings) == _of_site(settings)
-        else "The settings have changed since the check."
-    )
+    is_same_site = same_grid(check.settings, settings, sensors=False)
+    return OTHER_SENSORS if is_same_site else "The settings have changed since the check."
 
 
-def checked_settings(scene: bpy.types.Scene) -> SurveySettings | str:
-    """Return the settings that a check of a scene tells of, or what is wrong with them."""
+def survey_settings(scene: bpy.types.Scene) -> SurveySettings | str:
+    """Return the settings of a scene's survey, or what is wrong with them."""
     try:
-        return _without_search(scene.seip.survey.settings())
+        settings: SurveySettings = scene.seip.survey.settings()
     except SeipError as error:
         return str(error)
+    return settings
 
 
-def _of_site(settings: SurveySettings | str) -> SurveySettings | str:
-    """Return settings with the default sensors, heights and tilts."""
-    if isinstance(settings, str):
-        return settings
-    usual = CandidateSettings()
-    candidates = replace(settings.candidates, sensors=usual.sensors, heights=usual.heights, tilts=usual.tilts)
-    return replace(settings, candidates=candidates)
-
-
-def same_grid(one: SurveySettings, other: SurveySettings) -> bool:
-    """Return whether settings differ in how a placement is searched at most."""
-    return _without_search(one) == _without_search(other)
-
-
-def _without_search(settings: SurveySettings) -> SurveySettings:
-    default = SurveySettings()
-    return replace(settings, solver=default.solver, effort=default.effort)
+def same_grid(one: SurveySettings | str, other: SurveySettings | str, *, sensors: bool = True) -> bool:
+    """Return whether settings differ at most in how a placement is searched, and in sensors, heights and tilts."""
+    if isinstance(one, str) or isinstance(other, str):
+        return one == other
+    as_other = replace(one, solver=other.solver, effort=other.effort)
+    if not sensors:
+        own, theirs = one.candidates, other.candidates
+        mounts = replace(own, sensors=theirs.sensors, heights=theirs.heights, tilts=theirs.tilts)
+        as_other = replace(as_other, candidates=mounts)
+    return as_other == other

@@ -11,7 +11,6 @@ import time
 from collections.abc import Generator
 from contextlib import suppress
 from dataclasses import replace
-from pathlib import Path
 
 import bpy
 
@@ -19,14 +18,14 @@ from . import preferences
 from .core.errors import SeipError
 from .core.output.results.placement_record import PlacementRecord, parsed_record
 from .core.progress import Progress
+from .core.storage.files import check_folder
 from .core.workflows.records import inputs_of, restored_solution
 from .core.workflows.survey import Survey, lay_out, see
-from .core.workflows.survey_settings import SurveySettings
 from .scene import changes
-from .scene.changes import Watch, watch
+from .scene.changes import watch
 from .scene.read import SceneReading, read_scene
 from .scene_status import FILE_VERSION, obstacle, same_grid
-from .session import Resources, SceneState, session
+from .session import SceneState, session
 from .viewport import overlays
 
 LOAD_DELAY = 0.2
@@ -41,21 +40,31 @@ def survey(scene: bpy.types.Scene) -> Generator[Progress, None, SceneState]:
     SeipError
         The scene lacks something, or a setting of the panel is invalid.
     """
+    began = time.perf_counter()
     settings = scene.seip.survey.settings()
     settings.models()  # refuses before the scene is read
     catalogues = tuple((path, path.stat().st_mtime_ns) for path in settings.catalogue)
-    resources = Resources(preferences.cache_folder(), preferences.cores())
+    cache, cores = preferences.cache_folder(), preferences.cores()
     state = session.of(scene).state
     if state is not None and not state.watch.look(scene) and state.catalogues == catalogues:
         if same_grid(settings, state.layout.settings):
             layout = replace(state.layout, settings=settings)
-            return _nothing_to_do(replace(state, layout=layout, resources=resources))
-        reading = SceneReading(state.layout.geometry, state.warnings)
-        return _laid_out(reading, settings, state.watch, resources, catalogues)
-    began = time.perf_counter()
-    watching = watch(scene)
-    reading = read_scene(scene)
-    return _laid_out(reading, settings, watching, resources, catalogues, time.perf_counter() - began)
+            return _nothing_to_do(replace(state, layout=layout, grid_file=cache / state.grid_file.name, cores=cores))
+        reading, watching = SceneReading(state.layout.geometry, state.warnings), state.watch
+    else:
+        watching, reading = watch(scene), read_scene(scene)
+    seconds = time.perf_counter() - began
+
+    def steps() -> Generator[Progress, None, SceneState]:
+        yield Progress(0, 0, "laying out the site")
+        began = time.perf_counter()
+        layout = lay_out(reading.geometry, settings, reading.warnings)
+        durations = {"read the scene": seconds, "lay out the site": time.perf_counter() - began}
+        inputs = inputs_of(layout)
+        file = cache / f"{inputs['visibility'][:32]}.npz"
+        return SceneState(layout, inputs, watching, file, cores, catalogues, reading.warnings, durations=durations)
+
+    return steps()
 
 
 def with_visibility(state: SceneState) -> Generator[Progress, None, tuple[SceneState, Survey]]:
@@ -63,18 +72,12 @@ def with_visibility(state: SceneState) -> Generator[Progress, None, tuple[SceneS
     if state.survey is not None:
         return state, state.survey
     began = time.perf_counter()
-    state.resources.check()
-    file = state.resources.grid_file(state.inputs["visibility"])
-    survey = yield from see(state.layout, file, threads=state.resources.cores)
+    try:
+        check_folder(state.grid_file.parent)
+    except SeipError as error:
+        raise SeipError(f"{error} as Cache in the add-on's preferences") from error
+    survey = yield from see(state.layout, state.grid_file, threads=state.cores)
     return replace(state, layout=survey, durations=state.timed("visibility", began)), survey
-
-
-def with_visibility_of(
-    surveying: Generator[Progress, None, SceneState],
-) -> Generator[Progress, None, tuple[SceneState, Survey]]:
-    """Do the work of `survey`, and that of `with_visibility` on its result."""
-    state = yield from surveying
-    return (yield from with_visibility(state))
 
 
 def with_placement(scene: bpy.types.Scene) -> Generator[Progress, None, SceneState]:
@@ -92,52 +95,32 @@ def with_placement(scene: bpy.types.Scene) -> Generator[Progress, None, SceneSta
     return _restored(survey(scene), text)
 
 
-def with_grid_of_placement(scene: bpy.types.Scene) -> Generator[Progress, None, tuple[SceneState, Survey]]:
-    """Return a job that restores the grid of a scene's placement; raises as `with_placement` does."""
-    return _grid_again(survey(scene), parsed_record(scene.seip.result.record))
-
-
 def _nothing_to_do(state: SceneState) -> Generator[Progress, None, SceneState]:
     yield from ()
     return state
 
 
-def _laid_out(
-    reading: SceneReading,
-    settings: SurveySettings,
-    watching: Watch,
-    resources: Resources,
-    catalogues: tuple[tuple[Path, int], ...],
-    seconds: float = 0.0,
-) -> Generator[Progress, None, SceneState]:
-    yield Progress(0, 0, "laying out the site")
-    began = time.perf_counter()
-    layout = lay_out(reading.geometry, settings, reading.warnings)
-    durations = {"read the scene": seconds, "lay out the site": time.perf_counter() - began}
-    return SceneState(layout, inputs_of(layout), watching, resources, catalogues, reading.warnings, durations=durations)
-
-
-def _grid_again(
+def with_grid_of(
     surveying: Generator[Progress, None, SceneState], record: PlacementRecord
 ) -> Generator[Progress, None, tuple[SceneState, Survey]]:
+    """Do the work of `survey`, and restore the cached grid of a placement; raises as that of `with_placement` does."""
     state = yield from surveying
     if not record.is_of(state.inputs):
         raise SeipError("the scene or its settings have changed since the placement: place again")
-    if state.survey is None and not state.resources.grid_file(state.inputs["visibility"]).exists():
+    if state.survey is None and not state.grid_file.exists():
         raise SeipError("the cache no longer holds the visibility of this placement: place again")
     return (yield from with_visibility(state))
 
 
 def _restored(surveying: Generator[Progress, None, SceneState], text: str) -> Generator[Progress, None, SceneState]:
     record = parsed_record(text)
-    state, survey = yield from _grid_again(surveying, record)
+    state, survey = yield from with_grid_of(surveying, record)
     if state.record == text and state.solution is not None:
         return state
     solution = yield from restored_solution(survey, record)
     return replace(state, solution=solution, record=text)
 
 
-@bpy.app.handlers.persistent  # type: ignore[untyped-decorator]
 def _after_load(*_: object) -> None:
     """Compare the placement of the file with its scene, soon: Blender is not ready for work yet."""
     if not bpy.app.background and not bpy.app.timers.is_registered(_compare):
@@ -158,7 +141,6 @@ def _compare() -> None:
             return
 
 
-@bpy.app.handlers.persistent  # type: ignore[untyped-decorator]
 def _before_save(*_: object) -> None:
     """Store the version of the properties' layout in the file: Blender saves no defaults."""
     for scene in bpy.data.scenes:
@@ -166,7 +148,6 @@ def _before_save(*_: object) -> None:
             scene.seip.version = FILE_VERSION
 
 
-@bpy.app.handlers.persistent  # type: ignore[untyped-decorator]
 def _after_undo(*_: object) -> None:
     """Look soon whether scenes are as they were when they were read: Blender is not ready for work yet."""
     if not bpy.app.timers.is_registered(look_again):

@@ -57,7 +57,6 @@ def list_types(scene: bpy.types.Scene) -> None:
             one.use = is_new and key == DEFAULT_TYPE
 
 
-@bpy.app.handlers.persistent  # type: ignore[untyped-decorator]
 def _after_load(*_: object) -> None:
     """List the types, and take over placements of commands; without a record use the types of the sensors."""
     refresh()

@@ -29,49 +29,14 @@ from .core.sensing.scans.frame import Frame
 from .core.sensing.scans.run_folder import Run
 from .core.sensing.scans.sensor import MountedSensor
 from .core.sensing.scans.simulation import Simulation
-from .core.sensing.traffic.source import TrafficFiles
-from .core.sensing.traffic.trajectories import Trajectories
 from .core.sensing.visibility.visibility_model import VisibilityModel
-from .core.storage.files import check_folder
+from .core.site.check import SiteCheck
 from .core.workflows.returns import SensorReturns
 from .core.workflows.site_places import SitePlaces
 from .core.workflows.survey import Layout, Survey
 from .core.workflows.survey_settings import SurveySettings
 from .overlay import Overlay
 from .scene.changes import Watch
-
-
-@dataclass(frozen=True)
-class Resources:
-    """Values of the preferences for work in a thread, which must not read them from Blender.
-
-    Parameters
-    ----------
-    cache : Path
-        Folder in which visibility is kept.
-    cores : int or None
-        Number of threads, or None if it is not set.
-    """
-
-    cache: Path
-    cores: int | None
-
-    def grid_file(self, key: str) -> Path:
-        """Return where the cache keeps a visibility grid."""
-        return self.cache / f"{key[:32]}.npz"
-
-    def check(self) -> None:
-        """See that visibility can be kept, and say where the folder is set if it cannot.
-
-        Raises
-        ------
-        SeipError
-            The folder cannot be written.
-        """
-        try:
-            check_folder(self.cache)
-        except SeipError as error:
-            raise SeipError(f"{error} as Cache in the add-on's preferences") from error
 
 
 @dataclass(frozen=True)
@@ -86,8 +51,10 @@ class SceneState:
         Digests of what a placement on that layout follows from; see `inputs_of`.
     watch : Watch
         Whether the scene has changed since.
-    resources : Resources
-        Values of the preferences at the last request.
+    grid_file : Path
+        Where the cache keeps the visibility grid, by the preferences at the last request.
+    cores : int or None
+        Number of threads, or None if it is not set.
     catalogues : tuple
         The user's catalogue files and when each was last written.
     solution : Solution or None
@@ -100,7 +67,8 @@ class SceneState:
     layout: Layout
     inputs: Mapping[str, str]
     watch: Watch
-    resources: Resources
+    grid_file: Path
+    cores: int | None
     catalogues: tuple[tuple[Path, int], ...]
     warnings: tuple[str, ...] = ()
     solution: Solution | None = None
@@ -125,16 +93,17 @@ class SceneState:
 
 @dataclass(frozen=True)
 class CheckedScene:
-    """Inputs of a check of a site.
+    """A check of a site, and its inputs.
 
     Parameters
     ----------
     watch : Watch
         Whether the scene has changed since.
     settings : SurveySettings or str
-        See `scene_status.checked_settings`.
+        See `scene_status.survey_settings`.
     """
 
+    found: SiteCheck
     watch: Watch
     settings: SurveySettings | str
 
@@ -181,8 +150,6 @@ class FollowedSensors:
         Share of the targets that some sensor sees.
     summary : ReturnsSummary or None
         Returns of all sensors together.
-    moved : tuple of str
-        Labels of those that are not where the placement put them.
     problem : str
         Why nothing is followed at the moment.
     """
@@ -194,25 +161,7 @@ class FollowedSensors:
     sensors: dict[str, tuple[MountedSensor, Boolean, NDArray[np.float32] | None]] = field(default_factory=dict)
     coverage: float = 0.0
     summary: ReturnsSummary | None = None
-    moved: tuple[str, ...] = ()
     problem: str = ""
-
-
-@dataclass(frozen=True, eq=False)
-class SceneTraffic:
-    """Traffic that was read from files.
-
-    Parameters
-    ----------
-    changed : tuple of float
-        When each of the files was written, as its system says.
-    trajectories : Trajectories
-        In the scene's axes.
-    """
-
-    files: TrafficFiles
-    changed: tuple[float, ...]
-    trajectories: Trajectories
 
 
 @dataclass
@@ -259,11 +208,10 @@ class LastVerification:
 
 @dataclass
 class SceneMemory:
-    """What is known of a scene: its state, check, traffic, last scan and last verification."""
+    """What is known of a scene: its state, check, last scan and last verification."""
 
     state: SceneState | None = None
     check: CheckedScene | None = None
-    traffic: SceneTraffic | None = None
     scan: LastScan | None = None
     verification: LastVerification | None = None
 

@@ -34,6 +34,8 @@ class Progress:
         stages of work. A search, which may end at any step, has a total of 0.
     best : str
         Best value that a search has found so far, in the words of the answer: "71% of the road"; "" before the first.
+    poses : tuple of int
+        Candidate poses of that placement, ascending.
     gap : float or None
         Largest share by which a better value is still possible; None without a bound.
     """
@@ -43,6 +45,7 @@ class Progress:
     what: str
     counted: bool = True
     best: str = ""
+    poses: tuple[int, ...] = ()
     gap: float | None = None
 
 
@@ -175,8 +178,8 @@ def altered(
 
 
 def within(whole: Progress, steps: Generator[Progress, None, Result]) -> Generator[Progress, None, Result]:
-    """Run work as one unit of a larger whole: each step yields the progress of the whole, with best value and gap."""
-    return altered(steps, lambda step: replace(whole, best=step.best, gap=step.gap))
+    """Run work as one unit of a larger whole: each step yields the progress of the whole, with the best placement."""
+    return altered(steps, lambda step: replace(whole, best=step.best, poses=step.poses, gap=step.gap))
 
 
 def in_thread(

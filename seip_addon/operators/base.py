@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Callable, Generator
-from typing import Generic, TypeVar
+from contextlib import suppress
+from typing import Any, TypeVar
 
 import bpy
 
@@ -21,6 +22,8 @@ from ..session import RunningWork, scene_of, session
 Result = TypeVar("Result")
 Outcome = set[str]
 Obstacles = tuple[Callable[[bpy.types.Scene], str], ...]
+Job = Generator[Generator[Progress, None, Any], tuple[bpy.types.Scene, Any], None]
+"""See `LongWork.job`."""
 
 REPORT_WIDTH = 72
 """Letters in a line of an error."""
@@ -62,6 +65,15 @@ class Conditional:
 
     obstacles: Obstacles = ()
     """Functions that return a reason why the operator is disabled in a scene, or ""."""
+    bl_idname: str
+    bl_label: str
+
+    def __init_subclass__(cls) -> None:
+        """Name an operator by its class: ``SEIP_OT_load_traffic`` is ``seip.load_traffic`` and *Load Traffic*."""
+        name = cls.__name__.removeprefix("SEIP_OT_")
+        if name != cls.__name__:
+            cls.bl_idname = f"seip.{name}"
+            cls.bl_label = vars(cls).get("bl_label", name.replace("_", " ").title())
 
     @classmethod
     def why_not(cls, context: bpy.types.Context) -> str:
@@ -83,7 +95,7 @@ class ForReadyScene(Conditional):
     obstacles: Obstacles = (scene_status.obstacle,)
 
 
-class ShortWork:
+class ShortWork(Conditional):
     """Mixin for operators that are done at once: an error is reported to the user."""
 
     def act(self, context: bpy.types.Context) -> None:
@@ -95,7 +107,7 @@ class ShortWork:
         return attempt(self, lambda: self.act(context))
 
 
-class LongWork(Generic[Result]):
+class LongWork(Conditional):
     """Mixin for operators with long computations.
 
     From a script, or without a window, `execute` blocks until the result is
@@ -109,22 +121,23 @@ class LongWork(Generic[Result]):
     acceptance: Acceptance | None = None
     """Set by an operator whose search a user can end with the best result so far."""
 
-    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, Result]:
-        """Read the inputs from the scene, on the main thread, and return the work.
+    def job(self, scene: bpy.types.Scene) -> Job:
+        """Read the inputs from a scene, yield the work, and store and report its result; runs on the main thread.
 
         The work runs in a thread: it must touch neither Blender's data nor `session`, only return its result, which
-        is discarded if the work is stopped.
+        is discarded if the work is stopped. ``yield`` returns the scene, in whose place undo may have put another
+        Python object, and the result.
         """
-        raise NotImplementedError
-
-    def conclude(self, scene: bpy.types.Scene, result: Result) -> None:
-        """Store the result in the scene and in `session`, and report it; called on the main thread."""
         raise NotImplementedError
 
     def execute(self, context: bpy.types.Context) -> Outcome:
         """Do the work and wait for it."""
-        scene = context.scene
-        return attempt(self, lambda: self.conclude(scene, finish(self.prepare(scene))))
+
+        def act() -> None:
+            job = self.job(context.scene)
+            _conclude(job, context.scene, finish(next(job)))
+
+        return attempt(self, act)
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event | None) -> Outcome:
         """Start the work in a thread."""
@@ -145,7 +158,7 @@ class LongWork(Generic[Result]):
             self._report(self._running.work.progress)
             return {"PASS_THROUGH"}
         self._end(context)
-        return attempt(self, lambda: self.conclude(scene_of(self._scene), self._running.work.result()))
+        return attempt(self, lambda: _conclude(self._job, scene_of(self._scene), self._running.work.result()))
 
     def cancel(self, context: bpy.types.Context) -> None:
         """Stop because Blender quits, closes the window or opens another file, so that no thread outlives its data."""
@@ -156,9 +169,9 @@ class LongWork(Generic[Result]):
         if session.running is not None:
             raise SeipError("other work is under way: wait for it, or stop it with the button beside its bar")
         self._scene = context.scene.session_uid
-        # of the class, as panels spell it: Blender gives the instance's as SEIP_OT_…
-        name = type(self).bl_idname  # type: ignore[attr-defined]  # of Blender's operators
-        work = Background(self.prepare(context.scene))
+        name = type(self).bl_idname  # of the class, as panels spell it: Blender gives the instance's as SEIP_OT_…
+        self._job = self.job(context.scene)
+        work = Background(next(self._job))
         self._running = session.running = RunningWork(name, work, acceptance=self.acceptance)
         self._report = reporter(self._show, SHOW_INTERVAL)
         self._running.timer = context.window_manager.event_timer_add(TIMER_INTERVAL, window=context.window)
@@ -167,15 +180,20 @@ class LongWork(Generic[Result]):
     def _show(self, progress: Progress, duration: str) -> None:
         """Show the line of progress in the status bar, as the sidebar may be closed, and in the sidebar."""
         self._running.shown = (progress, duration)
-        name = type(self).bl_label  # type: ignore[attr-defined]  # of Blender's operators
         line = progress_line(progress, duration)
-        _say(bpy.context, f"{name}: {line} (to stop it: Object ▸ SEIP ▸ Stop, or × in the sidebar)")
+        _say(bpy.context, f"{type(self).bl_label}: {line} (to stop it: Object ▸ SEIP ▸ Stop, or × in the sidebar)")
         _redraw(bpy.context)
 
     def _end(self, context: bpy.types.Context) -> None:
         _stop(self._running)
         _say(context, None)
         _redraw(context)
+
+
+def _conclude(job: Job, scene: bpy.types.Scene, result: object) -> None:
+    """Give a job the result of its work."""
+    with suppress(StopIteration):
+        job.send((scene, result))
 
 
 def _say(context: bpy.types.Context, text: str | None) -> None:
@@ -203,39 +221,34 @@ def _redraw(context: bpy.types.Context) -> None:
                     region.tag_redraw()
 
 
-class SEIP_OT_stop(Conditional, bpy.types.Operator):
+class SEIP_OT_stop(ShortWork, bpy.types.Operator):
     """Stop the work that is under way"""
-
-    bl_idname = "seip.stop"
-    bl_label = "Stop"
 
     obstacles = (lambda _: "nothing is under way" if session.running is None else "",)
 
-    def execute(self, _context: bpy.types.Context) -> Outcome:
+    def act(self, _context: bpy.types.Context) -> None:
         """Ask the work to stop."""
         if session.running is not None:
             session.running.stop = True
-        return {"FINISHED"}
 
 
-class SEIP_OT_accept(Conditional, bpy.types.Operator):
+class SEIP_OT_accept(ShortWork, bpy.types.Operator):
     """End the search with the best placement found so far"""
 
-    bl_idname = "seip.accept"
     bl_label = "Use Best So Far"
 
-    @classmethod
-    def why_not(cls, _context: bpy.types.Context) -> str:
-        """Return a reason if no search for a placement is running."""
-        running = session.running
-        searching = running is not None and running.acceptance is not None and running.acceptance.searching
-        return "" if searching else "no search for a placement is running"
+    obstacles = (lambda _: "" if is_searching() else "no search for a placement is running",)
 
-    def execute(self, _context: bpy.types.Context) -> Outcome:
+    def act(self, _context: bpy.types.Context) -> None:
         """Ask the search to end."""
         if session.running is not None and session.running.acceptance is not None:
             session.running.acceptance.accept()
-        return {"FINISHED"}
+
+
+def is_searching() -> bool:
+    """Return whether a search for a placement is running, whose best one so far can be used."""
+    running = session.running
+    return running is not None and running.acceptance is not None and running.acceptance.searching
 
 
 def forget() -> None:

@@ -16,21 +16,19 @@ from ..core.progress import Progress
 from ..core.storage.files import check_folder, digest, unfinished_name
 from ..core.workflows.detection import INSTALL, DetectionJob, detect_elsewhere
 from ..core.workflows.traffic_runs import found_runs
-from ..properties.conversion import absolute, output_folder, runs_folder
+from ..properties.conversion import absolute, runs_folder, saved_path
 from ..scene import contract
 from ..scene.blend_file import save_blend
 from ..scene.sensors import labelled_sensors, pose_of
-from .base import Conditional, LongWork, started
+from .base import Job, LongWork, started
+from .traffic import no_sensors
 
-NO_SENSORS = "There is no sensor to detect road users with: place sensors first."
 NO_PYTHON = f"Detection needs a Python with PyTorch, named in the extension's preferences: {INSTALL}."
 
 
 def why_no_detection(scene: bpy.types.Scene) -> str:
     """Return why nothing can be detected; nothing where it can."""
-    if not labelled_sensors(scene):
-        return NO_SENSORS
-    return scene_status.obstacle(scene) or no_python(scene)
+    return no_sensors(scene) or scene_status.obstacle(scene) or no_python(scene)
 
 
 def no_python(_scene: bpy.types.Scene) -> str:
@@ -47,39 +45,34 @@ def sensors_key(scene: bpy.types.Scene) -> str:
     return digest(*(part for parts in each for part in parts))
 
 
-class SEIP_OT_detect(Conditional, LongWork[str], bpy.types.Operator):
+class SEIP_OT_detect(LongWork, bpy.types.Operator):
     """Scan runs of traffic with the sensors of the scene and detect road users; runs in a separate Python with PyTorch"""  # noqa: E501  # a tooltip is one line
 
-    bl_idname = "seip.detect"
-    bl_label = "Detect"
     stopped_message = "stopped; nothing was written"
 
     obstacles = (why_no_detection,)
 
-    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, str]:
-        """Save the scene as it is, for the process that detects."""
+    def job(self, scene: bpy.types.Scene) -> Job:
+        """Save the scene as it is for the process that detects, and keep the figures with the scene."""
         request, python = scene.seip.detection, preferences.detecting_python()
         if python is None:
             raise SeipError(NO_PYTHON)
         job = DetectionJob(
             python,
-            tuple(found_runs(runs_folder(request.runs))),
+            tuple(found_runs(runs_folder(scene.seip.traffic.runs))),
             absolute(request.detector) if request.detector else None,
             preferences.catalogue_files(),
             scene.seip.survey.weather(),
         )
-        self._folder = output_folder(request.folder, "the figures")
-        self._sensors = sensors_key(scene)
-        return started(_detected(job, self._folder))
-
-    def conclude(self, scene: bpy.types.Scene, result: str) -> None:
-        """Keep the figures with the scene."""
-        scene.seip.detection.record, scene.seip.detection.sensors = result, self._sensors
+        folder = saved_path(request.folder, "the figures")
+        sensors = sensors_key(scene)
+        scene, result = yield started(_detected(job, folder))
+        scene.seip.detection.record, scene.seip.detection.sensors = result, sensors
         found = parsed_detection(result)
         for sentence in found.warnings:
             self.report({"WARNING"}, sentence)
         precision = found.average_precision[MAIN_RULE]
-        self.report({"INFO"}, f"average precision {precision.average_precision:.1%}; written to {self._folder}")
+        self.report({"INFO"}, f"average precision {precision.average_precision:.1%}; written to {folder}")
 
 
 def _detected(job: DetectionJob, folder: Path) -> Generator[Progress, None, str]:

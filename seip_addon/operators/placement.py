@@ -1,10 +1,11 @@
-"""Operators that compute visibility, solve a placement, compare it with its scene, and edit its constraints."""
+"""Operators that solve a placement, compare it with its scene, and edit its constraints."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Generator
-from dataclasses import replace
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import bpy
@@ -12,69 +13,66 @@ import bpy
 from .. import preferences, scene_status, scene_survey, selection
 from ..core.acceptance import Acceptance
 from ..core.choosing.placement.objective import Objective, check_objective
-from ..core.counts import counted
 from ..core.errors import SeipError
 from ..core.output.results.answer import answer
-from ..core.progress import Progress
+from ..core.progress import Progress, altered
 from ..core.workflows.detection import DetectionJob
 from ..core.workflows.early_answer import after_early_answer, early_answer
 from ..core.workflows.finalists import check_judged, find_finalists, judge_elsewhere, judged_solution
 from ..core.workflows.placing import place, with_context
-from ..core.workflows.survey import Survey
+from ..core.workflows.survey import Layout
 from ..core.workflows.traffic_runs import TrafficRuns, found_runs, read_runs
-from ..properties.conversion import output_folder, runs_folder
+from ..properties.conversion import runs_folder, saved_path
+from ..properties.placement import RULE_ITEMS
 from ..scene.write import write_result
-from ..session import SceneState, session
-from ..viewport import coverage
-from .base import Conditional, ForReadyScene, LongWork, Outcome, ShortWork, started
+from ..session import SceneState, scene_of, session
+from ..viewport import coverage, overlays, search
+from .base import ForReadyScene, Job, LongWork, ShortWork, started
 from .detection import NO_PYTHON, no_python, saved_scene
 from .results import keep_result
 
 
-class SEIP_OT_compute_visibility(ForReadyScene, LongWork[tuple[SceneState, Survey]], bpy.types.Operator):
-    """Compute which targets on the road are visible from each candidate pose"""
-
-    bl_idname = "seip.compute_visibility"
-    bl_label = "Compute Visibility"
-    bl_options = {"REGISTER"}  # nothing in the file changes
-
-    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, tuple[SceneState, Survey]]:
-        """Read the scene where it has changed."""
-        return scene_survey.with_visibility_of(scene_survey.survey(scene))
-
-    def conclude(self, scene: bpy.types.Scene, result: tuple[SceneState, Survey]) -> None:
-        """Hold the grid."""
-        state, survey = result
-        session.of(scene).state = state
-        site = survey.site
-        targets, poses = counted(len(site.targets), "target"), counted(len(site.candidates), "pose")
-        self.report({"INFO"}, f"visibility of {targets} from {poses} is known")
-
-
-class SEIP_OT_compare_scene(ForReadyScene, LongWork[SceneState], bpy.types.Operator):
+class SEIP_OT_compare_scene(ForReadyScene, LongWork, bpy.types.Operator):
     """Check whether the placement still matches the scene"""
 
-    bl_idname = "seip.compare_scene"
     bl_label = "Compare with Scene"
     bl_options = {"REGISTER"}  # nothing in the file changes
 
-    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, SceneState]:
-        """Read the scene where it has changed."""
-        return scene_survey.survey(scene)
-
-    def conclude(self, scene: bpy.types.Scene, result: SceneState) -> None:
-        """Hold what was read: the panel compares."""
-        session.of(scene).state = result
+    def job(self, scene: bpy.types.Scene) -> Job:
+        """Read the scene where it has changed: the panel compares."""
+        scene, state = yield scene_survey.survey(scene)
+        session.of(scene).state = state
 
 
-class _Placing(LongWork[SceneState]):
-    """A mixin: work that ends with a placement."""
+@dataclass(frozen=True, eq=False)
+class _Searching(Progress):
+    """Progress of a search for a placement, with the layout that has its poses."""
 
-    def conclude(self, scene: bpy.types.Scene, result: SceneState) -> None:
+    layout: Layout | None = None
+
+
+class _Placing(LongWork):
+    """A mixin: work that ends with a placement; the best so far is drawn while it is searched."""
+
+    _drawn: tuple[int, ...] = ()
+
+    def _show(self, progress: Progress, duration: str) -> None:
+        super()._show(progress, duration)
+        if isinstance(progress, _Searching) and progress.layout is not None and progress.poses not in {(), self._drawn}:
+            self._drawn = progress.poses
+            with suppress(SeipError):  # the scene was deleted
+                overlays.show(scene_of(self._scene), search.NAME, search.search_overlay(progress.layout, progress))
+
+    def _end(self, context: bpy.types.Context) -> None:
+        for scene in bpy.data.scenes:
+            overlays.hide(scene, search.NAME)
+        super()._end(context)
+
+    def _store(self, scene: bpy.types.Scene, state: SceneState) -> None:
         """Put the sensors into the scene, and all that is needed to go on later into the file."""
-        survey, solution = result.placed()
+        survey, solution = state.placed()
         write_result(scene, survey.site, solution.deployment)
-        record = keep_result(scene, result)
+        record = keep_result(scene, state)
         coverage.show_colours(scene)
         self.report({"INFO"}, " ".join(answer(record)[:2]))  # type: ignore[attr-defined]  # of Blender's operators
 
@@ -82,38 +80,39 @@ class _Placing(LongWork[SceneState]):
 class SEIP_OT_solve_placement(ForReadyScene, _Placing, bpy.types.Operator):
     """Choose the best sensors for the number, budget or coverage, and place them in the scene"""
 
-    bl_idname = "seip.solve_placement"
     bl_label = "Place Sensors"
 
-    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, SceneState]:
-        """Read the scene where it has changed, and state the objective."""
+    def job(self, scene: bpy.types.Scene) -> Job:
+        """Read the scene where it has changed, state the objective, and place sensors."""
         goal = scene.seip.goal
         objective = goal.objective()
-        folder = runs_folder(goal.runs) if objective.scenarios.kind == "traffic" else None
+        folder = runs_folder(scene.seip.traffic.runs) if objective.scenarios.kind == "traffic" else None
         self.acceptance = Acceptance()
-        return _placed(scene_survey.survey(scene), objective, folder, self.acceptance)
+        scene, state = yield _placed(scene_survey.survey(scene), objective, folder, self.acceptance)
+        self._store(scene, state)
 
 
-class SEIP_OT_judge_placement(Conditional, _Placing, bpy.types.Operator):
+class SEIP_OT_judge_placement(_Placing, bpy.types.Operator):
     """Place sensors, and choose among twelve good placements by what a detector finds with them in runs of traffic; runs in a separate Python with PyTorch"""  # noqa: E501  # a tooltip is one line
 
-    bl_idname = "seip.judge_placement"
     bl_label = "Choose by Detection"
 
     obstacles = (scene_status.obstacle, no_python)
 
-    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, SceneState]:
-        """Read the scene where it has changed, save it for the process that judges, and state the objective."""
+    def job(self, scene: bpy.types.Scene) -> Job:
+        """Read the scene where it has changed, save it for the process that judges, and place sensors."""
         seip, python = scene.seip, preferences.detecting_python()
         if python is None:
             raise SeipError(NO_PYTHON)
         objective = seip.goal.objective()
         check_judged(objective)
-        runs = tuple(found_runs(runs_folder(seip.goal.runs)))
+        runs = tuple(found_runs(runs_folder(seip.traffic.runs)))
         job = DetectionJob(python, runs, None, preferences.catalogue_files(), seip.survey.weather())
-        folder = output_folder(seip.detection.folder, "the detections")
+        folder = saved_path(seip.detection.folder, "the detections")
         self.acceptance = Acceptance()
-        return started(_judged(scene_survey.survey(scene), objective, job, folder, self.acceptance))
+        steps = _judged(scene_survey.survey(scene), objective, job, folder, self.acceptance)
+        scene, state = yield started(steps)
+        self._store(scene, state)
 
 
 def _judged(
@@ -145,9 +144,9 @@ def _placed(
     state = yield from surveying
     runs = None if folder is None else (yield from read_runs(found_runs(folder), state.layout))
     check_objective(state.layout.site, state.layout.models, objective)
-    grid_file = state.resources.grid_file(state.inputs["visibility"])
-    best = yield from early_answer(state.layout, objective, grid_file, state.resources.cores)
-    return (yield from after_early_answer(best, _searched(state, objective, runs, acceptance)))
+    early = yield from early_answer(state.layout, objective, state.grid_file, state.cores)
+    steps = after_early_answer(early, _searched(state, objective, runs, acceptance))
+    return (yield from altered(steps, lambda step: _Searching(**vars(step), layout=state.layout)))
 
 
 def _searched(
@@ -161,34 +160,26 @@ def _searched(
     return replace(state, solution=solution, durations=state.timed("placement", began))
 
 
-class SEIP_OT_choose_number(bpy.types.Operator):
+class SEIP_OT_choose_number(ShortWork, bpy.types.Operator):
     """Make this number of sensors the goal of the next placement; the tick marks the present placement"""
 
-    bl_idname = "seip.choose_number"
     bl_label = "Choose Number of Sensors"
     bl_options = {"REGISTER", "UNDO"}
 
     count: bpy.props.IntProperty(name="Sensors", description="Largest number of sensors", min=1, default=1)
 
-    def execute(self, context: bpy.types.Context) -> Outcome:
+    def act(self, context: bpy.types.Context) -> None:
         """Set the goal."""
         goal = context.scene.seip.goal
         goal.limit, goal.count = "COUNT", self.count
-        return {"FINISHED"}
 
 
 class SEIP_OT_add_rule(ShortWork, bpy.types.Operator):
     """Require or forbid a sensor at the position of the selected pole or sensor, or at the named one"""
 
-    bl_idname = "seip.add_rule"
-    bl_label = "Add Rule"
     bl_options = {"REGISTER", "UNDO"}
 
-    rule: bpy.props.EnumProperty(
-        name="Rule",
-        description="Requirement at the position",
-        items=(("MANDATORY", "Sensor", "There must be a sensor"), ("FORBIDDEN", "No sensor", "There must be none")),
-    )
+    rule: bpy.props.EnumProperty(name="Rule", description="Requirement at the position", items=RULE_ITEMS)
 
     def act(self, context: bpy.types.Context) -> None:
         """Add it, or change the one that is there."""

@@ -9,6 +9,7 @@ from collections.abc import Generator, Mapping, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
 from functools import lru_cache
+from itertools import count
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -20,7 +21,7 @@ from ..core.choosing.placement.objective import Objective
 from ..core.errors import SeipError
 from ..core.output.pictures.colours import compare, packed_counts, unpacked_counts
 from ..core.output.report.sections import write_report
-from ..core.output.results.answer import answer, change_text
+from ..core.output.results.answer import answer, change_text, sentence
 from ..core.output.results.file_names import REPORT_FILES
 from ..core.output.results.placement_record import PlacementRecord, Provenance, load_placement, parsed_record
 from ..core.output.results.versions import versions
@@ -31,7 +32,7 @@ from ..core.storage.files import check_folder, digest
 from ..core.workflows.moved_sensors import evaluate_moved_sensors
 from ..core.workflows.records import record_of
 from ..core.workflows.returns import SensorReturns
-from ..core.workflows.survey import Survey
+from ..properties.conversion import complaint, saved_path
 from ..scene.blend_file import save_blend
 from ..scene.coverage_colours import recolour, show_seen_by
 from ..scene.gltf import save_glb
@@ -43,16 +44,13 @@ from ..scene.sensors import labelled_sensors, placed_sensors, read_sensors
 from ..scene.write import coverage_of, shown_legend, take_over
 from ..sensor_edits import position_names, sensor_edits
 from ..session import SceneState, session
-from .base import ForReadyScene, LongWork, Obstacles, Outcome, Result, ShortWork, started
+from .base import ForReadyScene, Job, LongWork, Obstacles, Outcome, ShortWork, started
 
 OTHER_TARGETS = "The two placements were made on different targets: only their figures can be compared."
-PLAN, REPORT = "plan.png", REPORT_FILES[0]
+_FILES = {"Plan": "plan.png", "Report": REPORT_FILES[0]}
 _RECORD = "placement.json"
 EYE_DISTANCE = 10.0
 """Metres from a sensor's eye to the point that the view turns about."""
-
-
-_Following = tuple[SceneState, VisibilityModel, SensorReturns | None]  # what following sensors needs
 
 
 def no_placement(scene: bpy.types.Scene) -> str:
@@ -62,11 +60,7 @@ def no_placement(scene: bpy.types.Scene) -> str:
     if not scene.seip.result.record:
         missing = "There is no placement yet: place sensors first."
         return scene_status.UNEVALUATED if scene_status.has_unevaluated(scene) else missing
-    try:
-        parsed_record(scene.seip.result.record)
-    except SeipError as error:
-        return str(error)
-    return ""
+    return complaint(lambda: parsed_record(scene.seip.result.record))
 
 
 class ForPlacement(ForReadyScene):
@@ -77,33 +71,24 @@ class ForPlacement(ForReadyScene):
 
 def no_folder(scene: bpy.types.Scene) -> str:
     """Say why there is no folder yet to write the result to, and the cure; empty if there is one."""
-    folder = scene.seip.result.folder
-    if not folder:
-        return "Name a folder to write the result to."
-    if bpy.data.filepath or not folder.startswith("//"):
-        return ""
-    return f"Save the file, or choose another folder: {folder[2:] or 'this one'} is beside the file."
+    problem = complaint(lambda: saved_path(scene.seip.result.folder, "the result"))
+    return sentence(problem) if problem else ""
 
 
 def not_evaluated(scene: bpy.types.Scene) -> str:
     """Say what was done by hand to the sensors since they were placed or evaluated; empty if nothing was."""
-    sentence = sensor_edits(scene).describe()
-    return f"{sentence} Press Evaluate Sensors, or undo." if sentence else ""
+    edits = sensor_edits(scene).describe()
+    return f"{edits} Press Evaluate Sensors, or undo." if edits else ""
 
 
 class SEIP_OT_look_from_sensor(ForPlacement, ShortWork, bpy.types.Operator):
     """Look from the sensor that is active in the list towards the road"""
 
-    bl_idname = "seip.look_from_sensor"
     bl_label = "View from Sensor"
 
     def act(self, context: bpy.types.Context) -> None:
         """Set the view."""
-        result = context.scene.seip.result
-        label = result.sensors[result.active_sensor].name if result.sensors else ""
-        empty = placed_sensors(context.scene).get(label)
-        if empty is None:
-            raise SeipError(f"the sensor {label} is no longer in the scene: undo, or place again")
+        empty = active_sensor(context.scene)
         if context.space_data is None or context.space_data.type != "VIEW_3D":
             raise SeipError("there is no 3D view here: press this in the sidebar of one")
         eye = empty.matrix_world.translation
@@ -115,6 +100,15 @@ class SEIP_OT_look_from_sensor(ForPlacement, ShortWork, bpy.types.Operator):
         view.view_location = eye + EYE_DISTANCE * way
 
 
+def active_sensor(scene: bpy.types.Scene) -> bpy.types.Object:
+    """Return the empty of the sensor that is active in the list, or raise a `SeipError`."""
+    label = scene.seip.result.active_label()
+    empty = placed_sensors(scene).get(label)
+    if empty is None:
+        raise SeipError(f"the sensor {label} is no longer in the scene: undo, or place again")
+    return empty
+
+
 def _middle_of_road(scene: bpy.types.Scene) -> Vector:
     """Return the middle of the coverage, or the origin where it is gone."""
     coverage = coverage_of(scene)
@@ -122,37 +116,25 @@ def _middle_of_road(scene: bpy.types.Scene) -> Vector:
     return sum(corners, Vector()) / len(corners) if corners else Vector()
 
 
-class SEIP_OT_keep_placement(ForPlacement, bpy.types.Operator):
-    """Keep the present placement under a name, to compare later ones with it"""
+class SEIP_OT_keep_placement(ForPlacement, ShortWork, bpy.types.Operator):
+    """Keep the present placement, to compare later ones with it; its name in the list can be changed"""
 
-    bl_idname = "seip.keep_placement"
-    bl_label = "Keep Placement"
     bl_options = {"REGISTER", "UNDO"}
 
     name: bpy.props.StringProperty(name="Name", description="Name of the kept placement; numbered if empty")
 
     obstacles = (*ForPlacement.obstacles, not_evaluated)
 
-    def execute(self, context: bpy.types.Context) -> Outcome:
+    def act(self, context: bpy.types.Context) -> None:
         """Keep it, in place of another of that name."""
         seip = context.scene.seip
-        name = self.name.strip() or _free_name({one.name for one in seip.kept})
+        free = (f"Placement {number}" for number in count(1))
+        name = self.name.strip() or next(name for name in free if name not in seip.kept)
         entry = seip.kept.get(name) or seip.kept.add()
         entry.name = name
         for field in ("record", "targets", "seen"):
             setattr(entry, field, getattr(seip.result, field))
         seip.active_kept = seip.kept.find(name)
-        return {"FINISHED"}
-
-    def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> Outcome:
-        """Ask for the name."""
-        self.name = _free_name({one.name for one in context.scene.seip.kept})
-        outcome: Outcome = context.window_manager.invoke_props_dialog(self)
-        return outcome
-
-
-def _free_name(taken: set[str]) -> str:
-    return next(name for name in (f"Placement {n}" for n in range(1, len(taken) + 2)) if name not in taken)
 
 
 class SEIP_OT_remove_entry(bpy.types.Operator):
@@ -185,37 +167,25 @@ class SEIP_OT_remove_entry(bpy.types.Operator):
 class SEIP_OT_show_comparison(ForPlacement, ShortWork, bpy.types.Operator):
     """Colour the road by the placements that see it: both, only the kept one, only the present one or neither"""
 
-    bl_idname = "seip.show_comparison"
     bl_label = "Show Difference"
     bl_options = {"REGISTER", "UNDO"}
-
-    back: bpy.props.BoolProperty(
-        name="Back", description="Show the coverage of the present placement again", default=False
-    )
 
     def act(self, context: bpy.types.Context) -> None:
         """Colour the road."""
         scene = context.scene
         seip = scene.seip
-        present = unpacked_counts(seip.result.seen)
-        if self.back:
-            show_seen_by(scene, present)
-            return
         if not 0 <= seip.active_kept < len(seip.kept):
             raise SeipError("keep a placement first, to compare the present one with it")
         kept = seip.kept[seip.active_kept]
         if kept.targets != seip.result.targets:
             raise SeipError(OTHER_TARGETS)
-        colours = compare(unpacked_counts(kept.seen), present)
-        recolour(scene, colours)
-        shares = ", ".join(f"{words} {share:.2%}" for words, share in zip(colours.words, colours.shares, strict=True))
-        self.report({"INFO"}, f"{kept.name} and the present placement: {shares} of the road")
+        recolour(scene, compare(unpacked_counts(kept.seen), unpacked_counts(seip.result.seen)))
+        scene.seip.view.legend = True
 
 
-class SEIP_OT_follow_sensors(ForPlacement, LongWork[_Following], bpy.types.Operator):
+class SEIP_OT_follow_sensors(ForPlacement, LongWork, bpy.types.Operator):
     """Toggle live coverage while sensors are moved or turned by hand"""
 
-    bl_idname = "seip.follow_sensors"
     bl_label = "Follow Moved Sensors"
     bl_options = {"REGISTER"}
 
@@ -230,18 +200,17 @@ class SEIP_OT_follow_sensors(ForPlacement, LongWork[_Following], bpy.types.Opera
             return {"FINISHED"}
         return super().execute(context)
 
-    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, _Following]:
-        """Return the job that restores the placement."""
-        return _set_up(scene_survey.with_placement(scene))
-
-    def conclude(self, scene: bpy.types.Scene, result: _Following) -> None:
-        """Begin to follow."""
-        state, model, returns = result
+    def job(self, scene: bpy.types.Scene) -> Job:
+        """Restore the placement, and begin to follow."""
+        scene, (state, model, returns) = yield _set_up(scene_survey.with_placement(scene))
         session.of(scene).state = state
         live_coverage.start(scene, state, model, returns)
 
 
-def _set_up(finding: Generator[Progress, None, SceneState]) -> Generator[Progress, None, _Following]:
+def _set_up(
+    finding: Generator[Progress, None, SceneState],
+) -> Generator[Progress, None, tuple[SceneState, VisibilityModel, SensorReturns | None]]:
+    """Return what following sensors needs."""
     state = yield from finding
     settings = state.layout.settings
     yield Progress(0, 0, "getting ready to cast")
@@ -251,41 +220,37 @@ def _set_up(finding: Generator[Progress, None, SceneState]) -> Generator[Progres
     return state, visibility, SensorReturns(state.layout, solution.objective) if of_returns else None
 
 
-class SEIP_OT_evaluate_sensors(ForReadyScene, LongWork[SceneState], bpy.types.Operator):
+class SEIP_OT_evaluate_sensors(ForReadyScene, LongWork, bpy.types.Operator):
     """Evaluate the sensors of the scene at their present poses, and make them the placement"""
-
-    bl_idname = "seip.evaluate_sensors"
-    bl_label = "Evaluate Sensors"
 
     obstacles = (
         *ForReadyScene.obstacles,
         lambda scene: "" if scene_status.has_unevaluated(scene) else no_placement(scene),
     )
 
-    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, SceneState]:
-        """Read the poses of the sensors; those without a placement are evaluated under the goal of the panel."""
+    def job(self, scene: bpy.types.Scene) -> Job:
+        """Evaluate the sensors; those without a placement are evaluated under the goal of the panel."""
         mounted = read_sensors(scene, preferences.catalogue(), hidden=True)
         text, names = scene.seip.result.record, position_names(scene)
-        if not text:
-            surveying = scene_survey.with_visibility_of(scene_survey.survey(scene))
-            return _evaluated(surveying, scene.seip.goal.objective(), mounted, names)
-        goal = parsed_record(text).request.goal
-        return _evaluated(scene_survey.with_grid_of_placement(scene), goal, mounted, names)
-
-    def conclude(self, scene: bpy.types.Scene, result: SceneState) -> None:
-        """Make the sensors at their present poses the placement."""
-        survey, solution = result.placed()
+        record = parsed_record(text) if text else None
+        objective = scene.seip.goal.objective() if record is None else record.request.goal
+        scene, state = yield _evaluated(scene_survey.survey(scene), record, objective, mounted, names)
+        survey, solution = state.placed()
         take_over(scene, survey.site, solution.deployment, labelled_sensors(scene, hidden=True))
-        self.report({"INFO"}, answer(keep_result(scene, result))[0])
+        self.report({"INFO"}, answer(keep_result(scene, state))[0])
 
 
 def _evaluated(
-    finding: Generator[Progress, None, tuple[SceneState, Survey]],
+    surveying: Generator[Progress, None, SceneState],
+    record: PlacementRecord | None,
     objective: Objective,
     mounted: Sequence[MountedSensor],
     places: Mapping[str, str],
 ) -> Generator[Progress, None, SceneState]:
-    state, survey = yield from finding
+    if record is None:
+        state, survey = yield from scene_survey.with_visibility((yield from surveying))
+    else:
+        state, survey = yield from scene_survey.with_grid_of(surveying, record)
     solution = yield from evaluate_moved_sensors(survey, objective, mounted, places)
     return replace(state, solution=solution)
 
@@ -304,7 +269,7 @@ def keep_result(scene: bpy.types.Scene, state: SceneState) -> PlacementRecord:
     return record
 
 
-class _Writes(ForPlacement, LongWork[Result]):
+class _Writes(ForPlacement, LongWork):
     """Mixin for operators that write the placement into the folder of the result."""
 
     obstacles = (*ForPlacement.obstacles, no_folder, not_evaluated)
@@ -312,27 +277,23 @@ class _Writes(ForPlacement, LongWork[Result]):
 
 def _checked_folder(scene: bpy.types.Scene) -> Path:
     """Return the folder of the result, which can be written."""
-    folder = Path(bpy.path.abspath(scene.seip.result.folder))
+    folder = saved_path(scene.seip.result.folder, "the result")
     check_folder(folder)
     return folder
 
 
-class SEIP_OT_export_result(_Writes[SceneState], bpy.types.Operator):
+class SEIP_OT_export_result(_Writes, bpy.types.Operator):
     """Write tables, pictures and the scene with its sensors to the folder, replacing earlier ones"""
 
-    bl_idname = "seip.export_result"
     bl_label = "Export"
     stopped_message = "stopped; nothing was written"
 
-    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, SceneState]:
-        """Save the scene as it is, and find the placement again."""
-        self._folder = _checked_folder(scene)
-        return started(_exported(self._folder, scene))
-
-    def conclude(self, scene: bpy.types.Scene, result: SceneState) -> None:
-        """Report where the files are."""
-        session.of(scene).state = result
-        self.report({"INFO"}, f"written to {self._folder}")
+    def job(self, scene: bpy.types.Scene) -> Job:
+        """Save the scene as it is, find the placement again and write it, and report where the files are."""
+        folder = _checked_folder(scene)
+        scene, state = yield started(_exported(folder, scene))
+        session.of(scene).state = state
+        self.report({"INFO"}, f"written to {folder}")
 
 
 def _exported(folder: Path, scene: bpy.types.Scene) -> Generator[Progress, None, SceneState]:
@@ -362,23 +323,17 @@ def _exported(folder: Path, scene: bpy.types.Scene) -> Generator[Progress, None,
     return state
 
 
-class SEIP_OT_write_report(_Writes[tuple[SceneState, tuple[Path, ...]]], bpy.types.Operator):
+class SEIP_OT_write_report(_Writes, bpy.types.Operator):
     """Write a report on the placement to the folder, as HTML and PDF; export the placement first if needed"""
 
-    bl_idname = "seip.write_report"
-    bl_label = "Write Report"
     stopped_message = "stopped; no report was written"
 
-    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, tuple[SceneState, tuple[Path, ...]]]:
-        """Return the work: the export where the folder holds another result, and the report."""
+    def job(self, scene: bpy.types.Scene) -> Job:
+        """Export unless the folder holds this result, write the report, and say where the files are."""
         folder = _checked_folder(scene)
-        if _holds(folder, scene.seip.result.record, _time_of(folder / _RECORD)):
-            return _reported(folder, scene_survey.with_placement(scene))
-        return started(_reported(folder, _exported(folder, scene)))
-
-    def conclude(self, scene: bpy.types.Scene, result: tuple[SceneState, tuple[Path, ...]]) -> None:
-        """Report where the files are."""
-        state, written = result
+        is_exported = _holds(folder, scene.seip.result.record, _time_of(folder / _RECORD))
+        exporting = scene_survey.with_placement(scene) if is_exported else started(_exported(folder, scene))
+        scene, (state, written) = yield _reported(folder, exporting)
         session.of(scene).state = state
         self.report({"INFO"}, f"written: {' and '.join(path.name for path in written)} in {written[0].parent}")
 
@@ -391,14 +346,16 @@ def _reported(
 
 
 def exported_files(scene: bpy.types.Scene) -> dict[str, Path]:
-    """Return the plan and the report of the present placement by name, as far as the folder of the result has them."""
+    """Return the plan and the report of the present placement, as far as the folder of the result has them."""
     folder = Path(bpy.path.abspath(scene.seip.result.folder))
     written = _time_of(folder / _RECORD)
     if no_folder(scene) or written is None or not _holds(folder, scene.seip.result.record, written):
         return {}
-    times = {name: _time_of(folder / name) for name in (PLAN, REPORT)}
+    times = {what: _time_of(folder / name) for what, name in _FILES.items()}
     return {
-        name: folder / name for name, time in times.items() if time is not None and (name == PLAN or time >= written)
+        what: folder / _FILES[what]
+        for what, time in times.items()
+        if time is not None and (what == "Plan" or time >= written)  # an older report is on an earlier placement
     }
 
 

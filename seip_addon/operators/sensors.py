@@ -12,19 +12,17 @@ from ..core.counts import counted
 from ..core.errors import SeipError
 from ..core.sensing.lidar.catalogue import load_catalogue
 from ..session import session
-from ..viewport import beam_preview
-from .base import Conditional, Outcome, ShortWork
+from ..viewport import beam_preview, overlays
+from .base import Outcome, ShortWork
 
 
 def _no_preferences(_scene: bpy.types.Scene) -> str:
     return "Install the add-on as an extension: only then it has preferences" if preferences.own() is None else ""
 
 
-class SEIP_OT_add_catalogue(Conditional, ShortWork, bpy.types.Operator):
+class SEIP_OT_add_catalogue(ShortWork, bpy.types.Operator):
     """Add a catalogue of your own, which docs/sensors.md describes"""
 
-    bl_idname = "seip.add_catalogue"
-    bl_label = "Add Catalogue"
     obstacles = (_no_preferences,)
 
     filepath: bpy.props.StringProperty(
@@ -37,39 +35,39 @@ class SEIP_OT_add_catalogue(Conditional, ShortWork, bpy.types.Operator):
         context.window_manager.fileselect_add(self)
         return {"RUNNING_MODAL"}
 
-    def act(self, _context: bpy.types.Context) -> None:
+    def act(self, context: bpy.types.Context) -> None:
         """Read it, and keep its name."""
         path = Path(bpy.path.abspath(self.filepath))
         shipped = load_catalogue()
         models = load_catalogue([path])
         if path in preferences.catalogue_files():
             raise SeipError(f"{path.name} is a catalogue already: nothing was added")
-        preferences.add_catalogue(str(path))
+        preferences.own().catalogues.add().path = str(path)
+        context.preferences.is_dirty = True
         sensor_types.refresh()
         changed = sum(1 for key, model in models.items() if key not in shipped or model.source != shipped[key].source)
         self.report({"INFO"}, f"{path.name}: {changed} sensor types added or replaced")
 
 
-class SEIP_OT_remove_catalogue(Conditional, ShortWork, bpy.types.Operator):
+class SEIP_OT_remove_catalogue(ShortWork, bpy.types.Operator):
     """Remove a catalogue of your own from the list; the file stays"""
 
-    bl_idname = "seip.remove_catalogue"
-    bl_label = "Remove Catalogue"
     obstacles = (_no_preferences,)
 
     index: bpy.props.IntProperty(name="Number", description="Index of the catalogue, from 0", min=0)
 
-    def act(self, _context: bpy.types.Context) -> None:
+    def act(self, context: bpy.types.Context) -> None:
         """Forget it."""
-        preferences.remove_catalogue(self.index)
+        files = preferences.own().catalogues
+        if self.index >= len(files):
+            raise SeipError(f"there is no catalogue {self.index}: there are {len(files)}, counted from 0")
+        files.remove(self.index)
+        context.preferences.is_dirty = True
         sensor_types.refresh()
 
 
-class SEIP_OT_empty_cache(Conditional, ShortWork, bpy.types.Operator):
+class SEIP_OT_empty_cache(ShortWork, bpy.types.Operator):
     """Delete all stored visibility grids; they are computed again when needed"""
-
-    bl_idname = "seip.empty_cache"
-    bl_label = "Empty Cache"
 
     obstacles = (
         lambda _: "Wait for the work under way" if session.running else "",
@@ -87,19 +85,15 @@ class SEIP_OT_empty_cache(Conditional, ShortWork, bpy.types.Operator):
         self.report({"INFO"}, f"{counted(count, 'file')} deleted")
 
 
-class SEIP_OT_preview_beams(bpy.types.Operator):
+class SEIP_OT_preview_beams(ShortWork, bpy.types.Operator):
     """Show or hide the beams of the selected sensor, or else of the sensor shown in the sidebar at the 3D cursor: rings on a flat road and the edges of the vertical field of view"""  # noqa: E501  # a tooltip is one line
 
-    bl_idname = "seip.preview_beams"
-    bl_label = "Preview Beams"
-
-    def execute(self, _context: bpy.types.Context) -> Outcome:
+    def act(self, context: bpy.types.Context) -> None:
         """Show or hide them."""
-        if beam_preview.is_shown():
-            beam_preview.hide()
+        if overlays.find(context.scene, beam_preview.NAME):
+            overlays.hide(context.scene, beam_preview.NAME)
         else:
-            beam_preview.show()
-        return {"FINISHED"}
+            overlays.show(context.scene, beam_preview.NAME, beam_preview.beam_overlay())
 
 
 class SEIP_MT_survey_presets(bpy.types.Menu):

@@ -10,10 +10,9 @@ import bpy
 from .. import preferences, scene_status, selection, sensor_types
 from ..core.counts import counted
 from ..core.errors import SeipError
-from ..core.output.results.answer import sentence
 from ..core.output.results.placement_record import relevant_warnings
 from ..core.progress import Progress, finish
-from ..core.site.check import SceneContents, SiteCheck, check_site
+from ..core.site.check import Problem, SceneContents, SiteCheck, check_site
 from ..core.site.roles import Role
 from ..core.site.scene_geometry import SceneGeometry
 from ..core.site.site import Site
@@ -25,8 +24,8 @@ from ..core.workflows.survey_settings import SurveySettings
 from ..core.world.openstreetmap.map_links import parsed_position
 from ..core.world.streetscape.site_file import DESCRIPTION_SUFFIX
 from ..properties import traffic
-from ..properties.conversion import absolute
-from ..properties.site import ROLE_ITEMS, SEIP_PG_problem, SEIP_PG_site
+from ..properties.conversion import absolute, complaint
+from ..properties.site import ROLE_ITEMS, SEIP_PG_site
 from ..scene import contract, roles
 from ..scene.build import build_scene, remove_site
 from ..scene.changes import watch
@@ -35,7 +34,7 @@ from ..scene.startup import remove_startup_objects
 from ..scene.views import frame_site
 from ..session import CheckedScene, session
 from ..viewport import overlays
-from .base import Conditional, LongWork, Obstacles, Outcome, ShortWork
+from .base import Conditional, Job, LongWork, Obstacles, Outcome, ShortWork
 
 EXAMPLE = Path(__file__).resolve().parents[2] / "scenes" / f"junction{DESCRIPTION_SUFFIX}"
 """The site that comes with SEIP: beside the package, in a checkout as in the extension."""
@@ -45,8 +44,6 @@ NO_NEW_SITE = "Paste latitude and longitude, or a link of a web map, into New Si
 NO_PLACE = "Choose a junction, or give latitude and longitude"
 COPIED = ("source", "position", "region_shape", "radius", "osm", "terrain", "terrain_epsg")
 """Properties of a choice that a site in a new scene takes over."""
-SHARE_OF_VIEW = 0.6
-"""Of a drawn area in the size of the view."""
 AREA_ITEMS = tuple(item for item in ROLE_ITEMS if Role[item[0]] in roles.AREAS)
 
 
@@ -56,11 +53,8 @@ class _WritesScene(Conditional):
     obstacles: Obstacles = (scene_status.not_own,)
 
 
-class SEIP_OT_choose_map(_WritesScene, LongWork[SitePlaces], bpy.types.Operator):
+class SEIP_OT_choose_map(_WritesScene, LongWork, bpy.types.Operator):
     """Choose an OpenDRIVE map (.xodr), an extract of OpenStreetMap (.osm, .osm.gz, .osm.pbf) or a site description (.toml), and choose among its junctions"""  # noqa: E501  # a tooltip is one line
-
-    bl_idname = "seip.choose_map"
-    bl_label = "Choose Map"
 
     filepath: bpy.props.StringProperty(
         name="File",
@@ -85,17 +79,14 @@ class SEIP_OT_choose_map(_WritesScene, LongWork[SitePlaces], bpy.types.Operator)
         """List the file's junctions: in a thread where the file browser asks, at once where a script does."""
         return super().invoke(context, None) if self.by_hand and not bpy.app.background else super().execute(context)
 
-    def prepare(self, _scene: bpy.types.Scene) -> Generator[Progress, None, SitePlaces]:
-        """Return the reading of the file."""
-        return site_places(Path(bpy.path.abspath(self.filepath)))
-
-    def conclude(self, scene: bpy.types.Scene, result: SitePlaces) -> None:
-        """List the junctions in place of those of another file, and ask for the place."""
+    def job(self, scene: bpy.types.Scene) -> Job:
+        """Read the file, list its junctions in place of those of another file, and ask for the place."""
+        scene, found = yield site_places(Path(bpy.path.abspath(self.filepath)))
         site = scene.seip.site
-        _list_places(site, self.filepath, result)
+        _list_places(site, self.filepath, found)
         self.report({"INFO"}, counted(len(site.junctions), "junction"))
         if self.by_hand and not bpy.app.background:
-            self._ask(site, result)
+            self._ask(site, found)
 
     def _ask(self, site: SEIP_PG_site, found: SitePlaces) -> None:
         """Ask for the place: on the map, or in a dialog where a description or the only junction gives it."""
@@ -123,11 +114,9 @@ def _list_places(site: SEIP_PG_site, source: str, places: SitePlaces) -> None:
     session.places = places
 
 
-class SEIP_OT_download_map(_WritesScene, LongWork[tuple[Path, SitePlaces]], bpy.types.Operator):
+class SEIP_OT_download_map(_WritesScene, LongWork, bpy.types.Operator):
     """Download the streets, buildings and trees around the place from OpenStreetMap, and choose the place there. A download of the same day is used again"""  # noqa: E501  # a tooltip is one line
 
-    bl_idname = "seip.download_map"
-    bl_label = "Download Map"
     stopped_message = "stopped; nothing was downloaded"
 
     obstacles = (
@@ -136,17 +125,13 @@ class SEIP_OT_download_map(_WritesScene, LongWork[tuple[Path, SitePlaces]], bpy.
         lambda _: preferences.why_no_download(),
     )
 
-    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, tuple[Path, SitePlaces]]:
-        """Take the position, for a site of the usual size: a larger one downloads more when it is built."""
-        self._near = parsed_position(scene.seip.site.new_site)
-        return _downloaded(SiteRequest(near_latlon=self._near, overpass=preferences.overpass()))
-
-    def conclude(self, scene: bpy.types.Scene, result: tuple[Path, SitePlaces]) -> None:
-        """List the junctions, and choose the position."""
-        path, places = result
+    def job(self, scene: bpy.types.Scene) -> Job:
+        """Download a site of the usual size, and list its junctions; a larger site downloads more when it is built."""
+        near = parsed_position(scene.seip.site.new_site)
+        scene, (path, places) = yield _downloaded(SiteRequest(near_latlon=near, overpass=preferences.overpass()))
         site = scene.seip.site
         _list_places(site, str(path), places)
-        site.junction, site.position = "", "{:.6f}, {:.6f}".format(*self._near)
+        site.junction, site.position = "", "{:.6f}, {:.6f}".format(*near)
         self.report({"INFO"}, counted(len(site.junctions), "junction"))
 
 
@@ -165,19 +150,15 @@ def missing_for_build(scene: bpy.types.Scene) -> str:
         return preferences.NO_SUMO
     if not site.has_place():
         return NO_PLACE
-    try:
-        site.request()
-    except SeipError as error:
-        return str(error)
-    return ""
+    return complaint(site.request)
 
 
-class _BuildsSite(_WritesScene, LongWork[BuiltSite]):
+class _BuildsSite(_WritesScene, LongWork):
     """A mixin for operators that build a site."""
 
     is_chosen = True
 
-    def conclude(self, scene: bpy.types.Scene, result: BuiltSite) -> None:
+    def _build(self, scene: bpy.types.Scene, result: BuiltSite) -> None:
         """Build the scene."""
         report = self.report  # type: ignore[attr-defined]  # of Blender's operators
         built = self._emptied(scene, result.model.name)
@@ -201,7 +182,7 @@ class _BuildsSite(_WritesScene, LongWork[BuiltSite]):
         if self.is_chosen and is_of_choice(scene):
             remove_site(scene)
             return scene
-        if has_site(scene):
+        if not scene_status.has_nothing(scene):
             new = bpy.data.scenes.new(name)
             if self.is_chosen:
                 _copy_choice(scene.seip.site, new.seip.site)
@@ -215,27 +196,22 @@ class _BuildsSite(_WritesScene, LongWork[BuiltSite]):
 class SEIP_OT_build_site(_BuildsSite, bpy.types.Operator):
     """Build a model of the chosen place, with camera, light and units. It replaces an earlier site of the same place; your own objects stay. If this scene has a site of another place, a new scene is made. Blender's default cube, light and camera are removed if the scene holds nothing else"""  # noqa: E501  # a tooltip is one line
 
-    bl_idname = "seip.build_site"
-    bl_label = "Build Site"
-
     obstacles = (missing_for_build, *_WritesScene.obstacles)
 
-    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, BuiltSite]:
-        """Take what was chosen."""
+    def job(self, scene: bpy.types.Scene) -> Job:
+        """Build what was chosen."""
         site = scene.seip.site
-        return build_site(Path(bpy.path.abspath(site.source)), site.request())
+        self._build(*(yield build_site(Path(bpy.path.abspath(site.source)), site.request())))
 
 
 class SEIP_OT_load_example(_BuildsSite, bpy.types.Operator):
     """Build the junction that comes with SEIP: in this scene, or in a new scene of this file where this one has a site already"""  # noqa: E501  # a tooltip is one line
 
-    bl_idname = "seip.load_example"
-    bl_label = "Load Example"
     is_chosen = False
 
-    def prepare(self, _scene: bpy.types.Scene) -> Generator[Progress, None, BuiltSite]:
-        """Take the example's description, which says all."""
-        return build_site(EXAMPLE, SiteRequest())
+    def job(self, _scene: bpy.types.Scene) -> Job:
+        """Build the example, whose description says all."""
+        self._build(*(yield build_site(EXAMPLE, SiteRequest())))
 
 
 def _copy_choice(chosen: SEIP_PG_site, site: SEIP_PG_site) -> None:
@@ -275,18 +251,12 @@ def _bring_to_front(scene: bpy.types.Scene) -> None:
 
 def is_of_choice(scene: bpy.types.Scene) -> bool:
     """Return whether the site of a scene is of the chosen place on the chosen map: a new one replaces it."""
-    return has_site(scene) and scene.get(contract.BUILT) == scene.seip.site.place()
-
-
-def has_site(scene: bpy.types.Scene) -> bool:
-    """Return whether a scene has any of the collections that a site is read from."""
-    return any(contract.base_name(collection) in contract.INPUTS for collection in scene.collection.children_recursive)
+    return not scene_status.has_nothing(scene) and scene.get(contract.BUILT) == scene.seip.site.place()
 
 
 class SEIP_OT_assign_role(_WritesScene, ShortWork, bpy.types.Operator):
     """Link the selected objects to the collection of a role, or remove them from it; other collections stay"""
 
-    bl_idname = "seip.assign_role"
     bl_label = "Assign"
     bl_options = {"REGISTER", "UNDO"}
 
@@ -305,27 +275,22 @@ class SEIP_OT_assign_role(_WritesScene, ShortWork, bpy.types.Operator):
         self.report({"INFO"}, f"{change(context.scene, context.selected_objects, role)} {what} the {role.value}")
 
 
-class SEIP_OT_add_area(_WritesScene, bpy.types.Operator):
-    """Add a flat area in a role, at the 3D cursor or in the middle of the view; go into Edit Mode to shape it"""
+class _InObjectMode(_WritesScene):
+    """A mixin for operators that cannot be used in Edit Mode."""
 
-    bl_idname = "seip.add_area"
+    @classmethod
+    def why_not(cls, context: bpy.types.Context) -> str:
+        """Return a reason in another mode than Object Mode."""
+        return super().why_not(context) or ("" if context.mode == "OBJECT" else "Leave Edit Mode first")
+
+
+class SEIP_OT_add_area(_InObjectMode, ShortWork, bpy.types.Operator):
+    """Add a flat area in a role at the 3D cursor; go into Edit Mode to shape it"""
+
     bl_label = "Draw Area"
     bl_options = {"REGISTER", "UNDO"}
 
-    role: bpy.props.EnumProperty(
-        name="Role",
-        description="Role of the area in the placement",
-        items=AREA_ITEMS,
-    )
-    place: bpy.props.EnumProperty(
-        name="Place",
-        description="Position of the area",
-        items=(
-            ("VIEW", "View", "Middle of the view, at the height of the 3D cursor, sized to the view"),
-            ("CURSOR", "3D Cursor", "At the 3D cursor"),
-        ),
-        default="CURSOR",
-    )
+    role: bpy.props.EnumProperty(name="Role", description="Role of the area in the placement", items=AREA_ITEMS)
     size: bpy.props.FloatVectorProperty(
         name="Size",
         description="Lengths along x and y",
@@ -345,71 +310,31 @@ class SEIP_OT_add_area(_WritesScene, bpy.types.Operator):
         max=360,
     )
 
-    @classmethod
-    def why_not(cls, context: bpy.types.Context) -> str:
-        """Return a reason if no object can be added."""
-        in_edit_mode = "" if context.mode == "OBJECT" else "Leave Edit Mode first"
-        return super().why_not(context) or in_edit_mode
-
-    def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> Outcome:
-        """Take the size from the view where the area is laid there."""
-        view = context.region_data
-        if self.place == "VIEW" and view is not None:
-            side = max(1.0, round(SHARE_OF_VIEW * view.view_distance))
-            self.size = (side, side)
-        return self.execute(context)
-
-    def execute(self, context: bpy.types.Context) -> Outcome:
+    def act(self, context: bpy.types.Context) -> None:
         """Add it, selected and active."""
-        middle = context.scene.cursor.location.copy()
-        if self.place == "VIEW" and context.region_data is not None:
-            middle.xy = context.region_data.view_location.xy
-        obj = roles.add_area(context.scene, Role[self.role], tuple(middle), tuple(self.size), self.turn, self.corners)
+        middle = tuple(context.scene.cursor.location)
+        obj = roles.add_area(context.scene, Role[self.role], middle, tuple(self.size), self.turn, self.corners)
         selection.select_alone(context, obj)
-        return {"FINISHED"}
 
 
-class SEIP_OT_check_site(LongWork[SiteCheck], bpy.types.Operator):
+class SEIP_OT_check_site(LongWork, bpy.types.Operator):
     """Count the objects by role, and list problems that prevent a placement or make it wrong"""
 
-    bl_idname = "seip.check_site"
-    bl_label = "Check Site"
-
-    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, SiteCheck]:
-        """Read the scene as it is now."""
-        self._watch, self._settings = watch(scene), scene_status.checked_settings(scene)
-        contents = contents_of(scene)
-        settings: SurveySettings | SeipError
-        try:
-            settings = scene.seip.survey.settings()
-        except SeipError as error:
-            settings = error
-        return _checked(contents, settings)
-
-    def conclude(self, scene: bpy.types.Scene, result: SiteCheck) -> None:
-        """List what was found."""
-        session.of(scene).check = CheckedScene(self._watch, self._settings)
-        site = scene.seip.site
-        site.checked = True
-        site.counts.clear()
-        for what, value in result.counts.items():
-            one = site.counts.add()
-            one.name, one.value = what, value
-        site.problems.clear()
-        for problem in result.problems:
-            listed = site.problems.add()
-            listed.name, listed.text = problem.obj, sentence(problem.text)
-            listed.is_error = problem.severity == "ERROR"
+    def job(self, scene: bpy.types.Scene) -> Job:
+        """Check the scene as it is now, and hold what was found."""
+        watching, settings = watch(scene), scene_status.survey_settings(scene)
+        scene, found = yield _checked(contents_of(scene), settings)
+        session.of(scene).check = CheckedScene(found, watching, settings)
         bpy.context.window_manager.seip_sections.follow_steps()
-        self.report({"INFO"}, in_short(site.problems))
+        self.report({"INFO"}, in_short(found.problems))
 
 
-def _checked(contents: SceneContents, settings: SurveySettings | SeipError) -> Generator[Progress, None, SiteCheck]:
+def _checked(contents: SceneContents, settings: SurveySettings | str) -> Generator[Progress, None, SiteCheck]:
     """Check a scene."""
 
     def laid_out(geometry: SceneGeometry) -> tuple[Site, tuple[str, ...]]:
-        if isinstance(settings, SeipError):
-            raise settings
+        if isinstance(settings, str):
+            raise SeipError(settings)
         layout = lay_out(geometry, settings)
         keys = settings.candidates.sensors  # warnings about a type are shown with the type
         return layout.site, tuple(relevant_warnings(layout.warnings, keys, ()))
@@ -417,55 +342,32 @@ def _checked(contents: SceneContents, settings: SurveySettings | SeipError) -> G
     return (yield from check_site(contents, laid_out))
 
 
-def in_short(problems: Iterable[SEIP_PG_problem]) -> str:
+def in_short(problems: Iterable[Problem]) -> str:
     """Return the number of errors and warnings as text; "no problem" where there is none."""
-    kinds = [problem.is_error for problem in problems]
+    kinds = [problem.severity == "ERROR" for problem in problems]
     errors, warnings = counted(sum(kinds), "error"), counted(len(kinds) - sum(kinds), "warning")
     if not kinds:
         return "no problem"
     return f"{errors}, {warnings}" if any(kinds) else warnings
 
 
-class SEIP_OT_show_problem(ShortWork, bpy.types.Operator):
+class SEIP_OT_show_problem(_InObjectMode, ShortWork, bpy.types.Operator):
     """Select the object with the problem, and bring it into view"""
 
-    bl_idname = "seip.show_problem"
     bl_label = "Show Object"
     bl_options = {"REGISTER", "UNDO"}
 
-    number: bpy.props.IntProperty(name="Number", description="Number of the problem in the list, from 0", min=0)
+    object: bpy.props.StringProperty(name="Object", description="Name of the object")
 
     def act(self, context: bpy.types.Context) -> None:
         """Select it alone, and frame it."""
-        obstacle = nothing_to_show(context, self.number)
-        if obstacle:
-            raise SeipError(obstacle)
-        obj = context.view_layer.objects[context.scene.seip.site.problems[self.number].name]
+        obj = context.view_layer.objects.get(self.object)
+        if obj is None:
+            raise SeipError(f"the object {self.object!r} is not in this view layer")
+        if not obj.visible_get():
+            raise SeipError(f"the object {self.object!r} is hidden: show it first")
         selection.select_alone(context, obj)
-        _frame_selected(context)
-
-
-def nothing_to_show(context: bpy.types.Context, number: int) -> str:
-    """Return why the object of a problem cannot be shown, or ""."""
-    problems = context.scene.seip.site.problems
-    if number >= len(problems):
-        return f"there is no problem {number}: check the site again"
-    name = problems[number].name
-    if not name:
-        return "this problem concerns the whole scene"
-    obj = context.view_layer.objects.get(name)
-    if obj is None:
-        return f"the object {name!r} is not in this view layer"
-    if not obj.visible_get():
-        return f"the object {name!r} is hidden: show it first"
-    return "" if context.mode == "OBJECT" else "leave Edit Mode first"
-
-
-def _frame_selected(context: bpy.types.Context) -> None:
-    """Bring what is selected into the 3D view that was clicked in."""
-    area = context.area
-    if area is None or area.type != "VIEW_3D":
-        return
-    region = next(region for region in area.regions if region.type == "WINDOW")
-    with context.temp_override(region=region):
-        bpy.ops.view3d.view_selected()
+        if context.area is not None and context.area.type == "VIEW_3D":
+            region = next(region for region in context.area.regions if region.type == "WINDOW")
+            with context.temp_override(region=region):
+                bpy.ops.view3d.view_selected()

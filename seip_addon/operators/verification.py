@@ -23,32 +23,27 @@ from ..core.storage.files import check_folder, whole_file
 from ..core.workflows.survey_settings import SurveySettings
 from ..core.workflows.verification_record import record_of, write_verification
 from ..core.workflows.verifying import verify
-from ..properties.conversion import absolute, output_folder
+from ..properties.conversion import absolute, saved_path
 from ..scene.changes import watch
 from ..scene.corrections import correct_scene
 from ..scene.read import read_scene
-from ..scene.sensors import labelled_sensors, read_sensors
+from ..scene.sensors import read_sensors
 from ..session import LastVerification, session
-from .base import Conditional, LongWork, ShortWork
+from .base import Job, LongWork, ShortWork
 from .detection import folder_of_result
 from .results import no_folder
+from .traffic import no_sensors
 
-NO_SENSORS = "There is no sensor to verify: place sensors first."
 NO_RECORDING = "Name a recording of the installed sensors: a folder of sweeps, or a .pcap."
 NOT_VERIFIED = "Not verified since the file was opened: verify again to add the changes."
 CHANGED = "The scene has changed since: verify again."
 CHANGES = VERIFICATION_PICTURES[0]
-_Verified = tuple[Verification, Mapping[str, bytes]]
-"""A verification with the content of its files."""
 
 
 def why_no_verification(scene: bpy.types.Scene) -> str:
     """Return why the installation cannot be verified, or ""."""
-    if reason := scene_status.obstacle(scene):
-        return reason
-    if not labelled_sensors(scene):
-        return NO_SENSORS
-    return no_folder(scene) or ("" if scene.seip.verification.recording else NO_RECORDING)
+    reason = scene_status.obstacle(scene) or no_sensors(scene) or no_folder(scene)
+    return reason or ("" if scene.seip.verification.recording else NO_RECORDING)
 
 
 def why_no_correction(scene: bpy.types.Scene) -> str:
@@ -71,24 +66,22 @@ def picture_of(scene: bpy.types.Scene) -> Path | None:
 
 
 def _folder_of(scene: bpy.types.Scene) -> Path:
-    return output_folder(scene.seip.result.folder, "the verification") / VERIFICATION_FOLDER
+    return saved_path(scene.seip.result.folder, "the verification") / VERIFICATION_FOLDER
 
 
-class SEIP_OT_verify(Conditional, LongWork[_Verified], bpy.types.Operator):
+class SEIP_OT_verify(LongWork, bpy.types.Operator):
     """Compare the installed sensors with the plan by a recording: poses, changes and coverage"""
 
-    bl_idname = "seip.verify"
     bl_label = "Verify Installation"
     bl_options = {"REGISTER", "UNDO"}  # the scene keeps what was found, also when a correction is undone
     stopped_message = "stopped; nothing was written"
 
     obstacles = (why_no_verification,)
 
-    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, _Verified]:
-        """Read the scene and its sensors, and open the recording."""
+    def job(self, scene: bpy.types.Scene) -> Job:
+        """Compare the scene and its sensors with the recording, write the files, and keep what was found."""
         settings = scene.seip.survey.settings()
-        self._folder = _folder_of(scene)
-        self._watch = watch(scene)
+        folder, watching = _folder_of(scene), watch(scene)
         geometry = settings.weather.over(read_scene(scene).geometry)
         sensors = tuple(
             replace(one, model=settings.weather.through(one.model))
@@ -97,20 +90,16 @@ class SEIP_OT_verify(Conditional, LongWork[_Verified], bpy.types.Operator):
         recording = open_recording(
             absolute(scene.seip.verification.recording), min(one.model.rotation_rate for one in sensors)
         )
-        return _verified(self._folder, geometry, sensors, recording, settings)
-
-    def conclude(self, scene: bpy.types.Scene, result: _Verified) -> None:
-        """Write the files, keep what was found, and report it."""
-        check_folder(self._folder)
-        found, files = result
+        scene, (found, files) = yield _verified(folder, geometry, sensors, recording, settings)
+        check_folder(folder)
         for name, content in files.items():
-            with whole_file(self._folder / name) as temporary:
+            with whole_file(folder / name) as temporary:
                 temporary.write_bytes(content)
         scene.seip.verification.found = "\n".join(summary(record_of(scene.name, "", found)))
-        session.of(scene).verification = LastVerification(found, self._watch)
+        session.of(scene).verification = LastVerification(found, watching)
         for sentence in found.warnings:
             self.report({"WARNING"}, sentence)
-        self.report({"INFO"}, f"verified; written to {self._folder}")
+        self.report({"INFO"}, f"verified; written to {folder}")
 
 
 def _verified(
@@ -119,7 +108,8 @@ def _verified(
     sensors: tuple[MountedSensor, ...],
     recording: Recording,
     settings: SurveySettings,
-) -> Generator[Progress, None, _Verified]:
+) -> Generator[Progress, None, tuple[Verification, Mapping[str, bytes]]]:
+    """Return the verification with the content of its files."""
     with folder_of_result(folder), TemporaryDirectory(prefix="seip-") as raw:
         found = yield from verify(
             geometry, sensors, recording, settings.visibility, spacing=settings.grid_spacing, engine=settings.engine
@@ -130,10 +120,9 @@ def _verified(
         return found, {path.name: path.read_bytes() for path in sorted(Path(raw).iterdir())}
 
 
-class SEIP_OT_correct_scene(Conditional, ShortWork, bpy.types.Operator):
+class SEIP_OT_correct_scene(ShortWork, bpy.types.Operator):
     """Add new objects as boxes, remove those that are gone, and move the sensors to their installed poses"""
 
-    bl_idname = "seip.correct_scene"
     bl_label = "Add to Scene"
     bl_options = {"REGISTER", "UNDO"}
 

@@ -2,30 +2,37 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator
 from itertools import chain, count
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
 
 import bpy
+import numpy as np
+from numpy.typing import NDArray
 
 from .. import last_scan, scene_survey
 from ..core.errors import SeipError
-from ..core.progress import Progress
 from ..core.sensing.visibility.sight_lines import pose_at, sight_lines
+from ..properties.conversion import saved_path
 from ..scene import contract
 from ..scene.coverage_colours import colour_coverage
-from ..scene.sensors import placed_sensors, pose_of
+from ..scene.sensors import pose_of
 from ..scene.write import coverage_of
 from ..session import SceneState, session
 from ..viewport import coverage, overlays
-from ..viewport.point_cloud import NAME as CLOUD
+from ..viewport.picture import view_pixels
 from ..viewport.sight_lines import NAME as SIGHT
 from ..viewport.sight_lines import sight_overlay
-from .base import Conditional, LongWork, Outcome, attempt
-from .results import ForPlacement, not_evaluated
+from .base import Job, LongWork, Outcome, ShortWork
+from .results import ForPlacement, active_sensor, not_evaluated
 
+ASPECTS = (
+    ("returns", "Returns", "Expected returns from a pedestrian, if sensors were placed for returns"),
+    ("seen", "Seen", "Road surface that some sensor measures"),
+    ("times", "Sensors", "Number of sensors that measure the road surface"),
+    ("weights", "Weights", "Weight of each part of the road, if regions are weighted"),
+)
+"""Meanings of the road's colours, with their names and descriptions."""
 NO_COVERAGE = "There is no coverage to show: place sensors first."
 
 
@@ -34,99 +41,67 @@ def why_no_coverage(scene: bpy.types.Scene) -> str:
     return NO_COVERAGE if coverage_of(scene) is None else ""
 
 
-class SEIP_OT_colour_coverage(Conditional, bpy.types.Operator):
+class SEIP_OT_colour_coverage(ShortWork, bpy.types.Operator):
     """Colour the coverage on the road, with a legend; a Solid view is set to show the colours"""
 
-    bl_idname = "seip.colour_coverage"
-    bl_label = "Colour Coverage"
     bl_options = {"REGISTER", "UNDO"}
 
     aspect: bpy.props.EnumProperty(
         name="Show",
         description="Meaning of the road's colours",
-        items=(
-            ("returns", "Returns", "Expected returns from a pedestrian, if sensors were placed for returns"),
-            ("seen", "Seen", "Road surface that some sensor measures"),
-            ("times", "Sensors", "Number of sensors that measure the road surface"),
-            ("weights", "Weights", "Weight of each part of the road, if regions are weighted"),
-        ),
+        items=ASPECTS,
         default="times",
     )
 
     obstacles = (why_no_coverage,)
 
-    def execute(self, context: bpy.types.Context) -> Outcome:
+    def act(self, context: bpy.types.Context) -> None:
         """Colour it."""
-        outcome = attempt(self, lambda: colour_coverage(context.scene, self.aspect))
-        if outcome == {"FINISHED"}:
-            context.scene.seip.view.legend = True
-            view = context.space_data
-            if isinstance(view, bpy.types.SpaceView3D) and not coverage.shows_coverage(view):
-                coverage.set_shading(view)
-        return outcome
+        colour_coverage(context.scene, self.aspect)
+        context.scene.seip.view.legend = True
+        view = context.space_data
+        if isinstance(view, bpy.types.SpaceView3D) and not coverage.shows_coverage(view):
+            coverage.set_shading(view)
 
 
-_items: list[tuple[str, str, str]] = []
-"""Blender does not keep the strings of a dynamic list: they must stay alive here."""
+class SEIP_OT_show_sight_lines(ForPlacement, LongWork, bpy.types.Operator):
+    """Draw lines from the sensor that is active in the list to the targets that it sees, and squares on those in its range that it does not see"""  # noqa: E501  # a tooltip is one line
 
-
-def _sensors(_operator: object, context: bpy.types.Context | None) -> list[tuple[str, str, str]]:
-    there = placed_sensors(context.scene) if context else {}
-    _items[:] = [(label, label, obj.name) for label, obj in there.items()] or [("NONE", "None", "Place sensors first")]
-    return _items
-
-
-class SEIP_OT_show_sight_lines(ForPlacement, LongWork[SceneState], bpy.types.Operator):
-    """Draw lines from a sensor to the targets that it sees, and squares on those in its range that it does not see"""
-
-    bl_idname = "seip.show_sight_lines"
-    bl_label = "Show Sight Lines"
     bl_options = {"REGISTER"}  # nothing in the file changes
 
-    sensor: bpy.props.EnumProperty(name="Sensor", description="Sensor that the lines start from", items=_sensors)
-
-    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, SceneState]:
-        """Return the job that restores the placement."""
-        return scene_survey.with_placement(scene)
-
-    def conclude(self, scene: bpy.types.Scene, result: SceneState) -> None:
-        """Draw them."""
-        session.of(scene).state = result
-        obj = placed_sensors(scene).get(self.sensor)
-        survey, _ = result.placed()
-        if obj is None:
-            raise SeipError(f"there is no sensor {self.sensor!r} in the scene: undo, or place again")
+    def job(self, scene: bpy.types.Scene) -> Job:
+        """Restore the placement, and draw them."""
+        scene, state = yield scene_survey.with_placement(scene)
+        session.of(scene).state = state
+        obj, label = active_sensor(scene), scene.seip.result.active_label()
+        survey, _ = state.placed()
         key = str(obj.get(contract.SENSOR))
         pose = pose_at(survey.site.candidates, key, *pose_of(obj))
         if pose is None:
-            raise SeipError(f"{self.sensor} is not at a candidate pose: move it back, or place again")
+            raise SeipError(f"{label} is not at a candidate pose: move it back, or place again")
         settings = survey.settings
         row = survey.grid.sees(pose)
         sight = sight_lines(survey.site, pose, survey.models[key], row, settings.visibility.delta, settings.engine)
-        overlays.show(scene, SIGHT, sight_overlay(sight, self.sensor))
+        overlays.show(scene, SIGHT, sight_overlay(sight, label))
 
 
-class SEIP_OT_hide_overlay(bpy.types.Operator):
+class SEIP_OT_hide_overlay(ShortWork, bpy.types.Operator):
     """Hide these points or lines"""
 
-    bl_idname = "seip.hide_overlay"
     bl_label = "Hide"
 
     name: bpy.props.StringProperty(name="Name", description="Name of the overlay")
 
-    def execute(self, context: bpy.types.Context) -> Outcome:
+    def act(self, context: bpy.types.Context) -> None:
         """Hide it; a point cloud is forgotten, as it would be shown again in other colours."""
-        if self.name == CLOUD:
+        if self.name == last_scan.NAME:
             last_scan.hide_cloud(context.scene)
         overlays.hide(context.scene, self.name)
-        return {"FINISHED"}
 
 
-class SEIP_OT_save_picture(ForPlacement, LongWork[SceneState], bpy.types.Operator):
+class SEIP_OT_save_picture(ForPlacement, LongWork, bpy.types.Operator):
     """Write a view of the placement with its legend, and the plan beside it, as one PNG"""
 
-    bl_idname = "seip.save_picture"
-    bl_label = "Save Picture"
     bl_options = {"REGISTER"}  # nothing in the file changes
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Outcome:
@@ -136,40 +111,30 @@ class SEIP_OT_save_picture(ForPlacement, LongWork[SceneState], bpy.types.Operato
 
     obstacles = (*ForPlacement.obstacles, not_evaluated)
 
-    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, SceneState]:
-        """Return the job that restores the placement."""
-        self._path = _free(_named(scene.seip.view.picture))
-        return scene_survey.with_placement(scene)
-
-    def conclude(self, scene: bpy.types.Scene, result: SceneState) -> None:
-        """Take the picture of a viewport."""
-        session.of(scene).state = result
+    def job(self, scene: bpy.types.Scene) -> Job:
+        """Restore the placement, and take the picture of a viewport."""
+        path = _free(_named(scene.seip.view.picture))
+        scene, state = yield scene_survey.with_placement(scene)
+        session.of(scene).state = state
         area = getattr(self, "_area", None) or bpy.context.area
         if bpy.app.background or area not in overlays.viewports(bpy.context.window_manager.windows):
             raise SeipError(
                 "there is no viewport here to take a picture of: press this in the sidebar of one, or export the files "
                 "with the rendered view"
             )
-        save_viewport_sheet(self._path, scene, area, result)
-        self.report({"INFO"}, f"written {self._path}")
+        save_viewport_sheet(path, state, view_pixels(scene, area))
+        self.report({"INFO"}, f"written {path}")
 
 
-def save_viewport_sheet(path: Path, scene: bpy.types.Scene, area: bpy.types.Area, state: SceneState) -> None:
-    """Write what a viewport shows, and the plan beside it."""
+def save_viewport_sheet(path: Path, state: SceneState, pixels: NDArray[np.uint8]) -> None:
+    """Write a picture of a viewport, and the plan beside it."""
     from PIL import Image  # noqa: PLC0415  # pictures take half a second to come, which nobody waits for at start
-
-    from ..viewport.picture import view_pixels  # noqa: PLC0415  # as above
-
-    _save_sheet(path, state, Image.fromarray(view_pixels(scene, area)))
-
-
-def _save_sheet(path: Path, state: SceneState, view: Any) -> None:  # noqa: ANN401  # PIL's image, not loaded yet
-    from PIL import Image  # noqa: PLC0415  # as above
 
     from ..core.output.pictures.labelled_view import save_sheet  # noqa: PLC0415  # as above
     from ..core.output.pictures.plan_view import save_plan_view  # noqa: PLC0415  # as above
 
     survey, solution = state.placed()
+    view = Image.fromarray(pixels)
     with TemporaryDirectory(prefix="seip-") as folder:
         drawn = Path(folder) / "plan.png"
         save_plan_view(drawn, survey.geometry, survey.site, solution.deployment, solution.caption)
@@ -178,9 +143,7 @@ def _save_sheet(path: Path, state: SceneState, view: Any) -> None:  # noqa: ANN4
 
 
 def _named(text: str) -> Path:
-    if text.startswith("//") and not bpy.data.filepath:
-        raise SeipError(f"the picture {text} is beside the file, and the file has not been saved: save it first")
-    path = Path(bpy.path.abspath(text))
+    path = saved_path(text, "the picture")
     if not path.name or path.is_dir():
         raise SeipError("name a file for the picture, not a folder")
     return path.with_suffix(".png")

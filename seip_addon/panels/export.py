@@ -28,11 +28,8 @@ def draw(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
 
 def _draw_files(layout: bpy.types.UILayout, files: dict[str, Path]) -> None:
     """Draw buttons that open the plan, the report and their folder, as far as they are there."""
-    if not files:
-        return
     row = layout.row(align=True)
-    if results.PLAN in files:
-        row.operator("wm.path_open", text="Open Plan", icon="IMAGE_DATA").filepath = str(files[results.PLAN])
-    if results.REPORT in files:
-        row.operator("wm.path_open", text="Open Report", icon="URL").filepath = str(files[results.REPORT])
-    row.operator("wm.path_open", text="", icon="FILE_FOLDER").filepath = str(next(iter(files.values())).parent)
+    for what, path in files.items():
+        row.operator("wm.path_open", text=f"Open {what}", icon="FILE").filepath = str(path)
+    for folder in {path.parent for path in files.values()}:
+        row.operator("wm.path_open", text="", icon="FILE_FOLDER").filepath = str(folder)

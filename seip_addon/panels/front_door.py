@@ -6,13 +6,13 @@ import bpy
 
 from ..operators.site import EXTRACTS
 
-OPENDRIVE = "*.xodr"
 
+class SEIP_FH_map(bpy.types.FileHandler):
+    """A map or an extract that is dropped into a 3D view; Blender matches only the last suffix of a name."""
 
-class _Dropped:
-    """A mixin: a file that is dropped into a 3D view is imported."""
-
+    bl_label = "OpenDRIVE or OpenStreetMap"
     bl_import_operator = "seip.choose_map"
+    bl_file_extensions = ".xodr;.osm;.gz"
 
     @classmethod
     def poll_drop(cls, context: bpy.types.Context) -> bool:
@@ -20,26 +20,9 @@ class _Dropped:
         return context.area is not None and context.area.type == "VIEW_3D"
 
 
-class SEIP_FH_opendrive(_Dropped, bpy.types.FileHandler):
-    """A map."""
-
-    bl_idname = "SEIP_FH_opendrive"
-    bl_label = "OpenDRIVE"
-    bl_file_extensions = ".xodr"
-
-
-class SEIP_FH_openstreetmap(_Dropped, bpy.types.FileHandler):
-    """An extract; of a name with two suffixes Blender looks at the last alone."""
-
-    bl_idname = "SEIP_FH_openstreetmap"
-    bl_label = "OpenStreetMap"
-    bl_file_extensions = ".osm;.gz"
-
-
 class SEIP_MT_main(bpy.types.Menu):
     """Menu with the operators of the sidebar, by name."""
 
-    bl_idname = "SEIP_MT_main"
     bl_label = "SEIP"
 
     def draw(self, _context: bpy.types.Context) -> None:
@@ -54,7 +37,7 @@ class SEIP_MT_main(bpy.types.Menu):
 
 STEPS: tuple[tuple[str, ...], ...] = (
     ("load_example", "download_map", "choose_map", "build_site", "check_site"),
-    ("add_catalogue", "preview_beams", "compute_visibility", "solve_placement"),
+    ("add_catalogue", "preview_beams", "solve_placement"),
     ("evaluate_sensors", "export_result"),
     ("colour_coverage", "save_picture"),
     ("load_traffic", "simulate_traffic", "scan_frame", "write_dataset", "detect"),
@@ -65,7 +48,7 @@ STEPS: tuple[tuple[str, ...], ...] = (
 
 def draw_import(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
     """Draw what File ▸ Import gets."""
-    for text, pattern in (("OpenDRIVE (.xodr)", OPENDRIVE), ("OpenStreetMap (.osm)", EXTRACTS)):
+    for text, pattern in (("OpenDRIVE (.xodr)", "*.xodr"), ("OpenStreetMap (.osm)", EXTRACTS)):
         menu.layout.operator("seip.choose_map", text=text).filter_glob = pattern
 
 
@@ -78,7 +61,7 @@ def draw_add(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
 
 def draw_object(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
     """Draw what the menu Object gets."""
-    menu.layout.menu(SEIP_MT_main.bl_idname)
+    menu.layout.menu(SEIP_MT_main.__name__)
 
 
 MENUS = (("TOPBAR_MT_file_import", draw_import), ("VIEW3D_MT_add", draw_add), ("VIEW3D_MT_object", draw_object))

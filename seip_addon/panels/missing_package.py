@@ -14,7 +14,6 @@ MISSING = ""
 class SEIP_PT_incomplete(Sidebar, bpy.types.Panel):
     """Says what is missing."""
 
-    bl_idname = "SEIP_PT_incomplete"
     bl_label = "SEIP Cannot Start"
 
     def draw(self, _context: bpy.types.Context) -> None:

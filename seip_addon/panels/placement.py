@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from functools import partial
-from pathlib import Path
 
 import bpy
 
@@ -15,14 +14,14 @@ from ..core.counts import counted, duration_text
 from ..core.output.results.answer import answer, sentence, status_text
 from ..core.output.results.placement_record import PlacementRecord, parsed_record, relevant_warnings
 from ..core.site.obstruction import NO_OBSTACLES_MESSAGE
-from ..core.workflows.traffic_runs import traffic_folder
 from ..operators.detection import no_python
 from ..operators.results import no_placement
 from ..operators.sensors import SEIP_MT_survey_presets
 from ..scene.sensors import labelled_sensors
 from ..sensor_edits import sensor_edits
+from ..session import session
 from .sections import BETWEEN, Status, draw_sections
-from .sidebar import RowList, draw_path, draw_reason, draw_run, draw_settings, is_narrow, settings_column
+from .sidebar import RowList, draw_path, draw_reason, draw_run, draw_runs, draw_settings, is_narrow, settings_column
 from .wrapped_text import BOX, draw_lines, draw_sentence, sidebar_width
 
 _SHOWN = {
@@ -32,8 +31,6 @@ _SHOWN = {
 }
 """Properties of the objective that are shown for each kind of scenarios."""
 
-
-BARE = sentence(NO_OBSTACLES_MESSAGE)
 NAME_SHARE = 0.68
 """Share of a row that the name of a figure takes."""
 NUMBER_SHARE = 0.3
@@ -42,8 +39,6 @@ NUMBER_SHARE = 0.3
 
 class SEIP_UL_rules(RowList, bpy.types.UIList):
     """Positions with a demand of their own."""
-
-    bl_idname = "SEIP_UL_rules"
 
     def draw_row(self, layout: bpy.types.UILayout, item: bpy.types.PropertyGroup) -> None:
         """Draw a position and what must be there."""
@@ -90,8 +85,10 @@ def draw(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     obstacle = scene_status.obstacle(scene)
     if obstacle:
         draw_sentence(layout, obstacle, icon="ERROR")
-    elif any(one.text == BARE for one in scene.seip.site.problems) and not scene_status.stale_check(scene):
-        draw_sentence(layout, BARE, icon="ERROR")  # the result says little of a real site: not only in a closed section
+    elif (check := session.of(scene).check) and not scene_status.stale_check(scene):
+        for problem in check.found.problems:  # the result says little of a real site: not only in a closed section
+            if problem.text == NO_OBSTACLES_MESSAGE:
+                draw_sentence(layout, sentence(problem.text), icon="ERROR")
     if not no_placement(scene):
         _draw_answer(layout, scene)
     elif scene_status.has_unevaluated(scene):
@@ -128,7 +125,7 @@ def _draw_objective(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
     goal = scene.seip.goal
     column = draw_settings(layout, goal, "criterion", "scenarios")
     if goal.scenarios == "traffic":
-        draw_path(column, goal, "runs", placeholder=traffic_folder(Path(bpy.data.filepath)).name)
+        draw_runs(column, scene)
     for name in _SHOWN[goal.scenarios]:
         column.prop(goal, name)
     if goal.scenarios == "nominal" or goal.risk == "none":
@@ -150,7 +147,7 @@ def _draw_rules(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
     if len(goal.rules):
         row = layout.row()
         rows = len(goal.rules)
-        row.template_list(SEIP_UL_rules.bl_idname, "", goal, "rules", goal, "active_rule", rows=rows, maxrows=rows)
+        row.template_list(SEIP_UL_rules.__name__, "", goal, "rules", goal, "active_rule", rows=rows, maxrows=rows)
         row.operator("seip.remove_entry", text="", icon="REMOVE").of = "RULES"
     layout.prop(goal, "position", text="", icon="VIEWZOOM", placeholder="Position, or the selected pole")
     row = layout.row(align=True)

@@ -4,26 +4,23 @@ from __future__ import annotations
 
 import bpy
 
+from .. import last_scan
 from ..core.choosing.placement.returns_summary import SURFACE_SEEN, returns_text
-from ..core.errors import SeipError
-from ..core.output.pictures.colours import BOTH, CLASS_WORDS, KEPT_ONLY, NEITHER, PRESENT_ONLY, Aspect, compared_shares
 from ..core.output.results.placement_record import PlacementRecord, parsed_record
 from ..core.sensing.lidar.model import short_name
 from ..operators import results
 from ..operators.results import no_placement
-from ..operators.view import why_no_coverage
+from ..operators.view import ASPECTS, why_no_coverage
+from ..properties.conversion import complaint
 from ..scene.write import ASPECT, aspects_of, coverage_of
+from ..sensor_edits import sensor_edits
 from ..session import FollowedSensors, session
 from ..viewport import coverage, overlays
-from ..viewport.point_cloud import NAME as CLOUD
 from ..viewport.sight_lines import NAME as SIGHT
 from . import placement
 from .sections import Status, draw_sections
-from .sidebar import RowList, draw_reason, draw_run, is_running
+from .sidebar import RowList, draw_reason, draw_run
 from .wrapped_text import draw_sentence
-
-ASPECTS: dict[Aspect, str] = {"returns": "Returns", "seen": "Seen", "times": "Sensors", "weights": "Weights"}
-"""What the buttons of the colours say."""
 
 
 def draw_view(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
@@ -45,13 +42,11 @@ def _draw_coverage(layout: bpy.types.UILayout, context: bpy.types.Context) -> No
     head.prop(context.scene.seip.view, "legend", text="", icon="INFO")
     obj = coverage_of(context.scene)
     row = column.row(align=True)
-    possible = ASPECTS if obj is None else aspects_of(obj)
-    for aspect, words in ASPECTS.items():
-        if aspect not in possible:
-            continue
-        now = obj is not None and obj.get(ASPECT) == aspect
-        button = row.operator("seip.colour_coverage", text=words, depress=now)
-        button.aspect = aspect
+    possible = tuple(aspect for aspect, _, _ in ASPECTS) if obj is None else aspects_of(obj)
+    for aspect, words, _ in ASPECTS:
+        if aspect in possible:
+            now = obj is not None and obj.get(ASPECT) == aspect
+            row.operator("seip.colour_coverage", text=words, depress=now).aspect = aspect
     if obj is not None and "returns" in possible and obj.get(ASPECT) in {"seen", "times"}:
         draw_sentence(column, SURFACE_SEEN, icon="INFO")
     if not draw_reason(column, why_no_coverage(context.scene)) and not coverage.shows_coverage(context.space_data):
@@ -64,12 +59,10 @@ def _draw_sight(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     column.label(text="Sight Lines")
     overlay = overlays.find(context.scene, SIGHT)
     row = column.row(align=True)
-    words = "From Sensor" if overlay is None else overlay.about
-    row.operator_menu_enum("seip.show_sight_lines", "sensor", text=words, icon="LIGHT_SPOT")
+    label = context.scene.seip.result.active_label() or "Sensor"
+    draw_run(row, "seip.show_sight_lines", icon="LIGHT_SPOT", text=f"From {label}", in_one_row=True)
     if overlay is not None:
         row.operator("seip.hide_overlay", text="", icon="X").name = SIGHT
-    if is_running("seip.show_sight_lines"):
-        draw_run(column, "seip.show_sight_lines")
     draw_reason(column, no_placement(context.scene))
 
 
@@ -77,7 +70,7 @@ def _draw_cloud(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     column = layout.column(align=True)
     column.label(text="Point Cloud")
     column.row(align=True).prop(context.scene.seip.view, "cloud_colour", expand=True)
-    column.operator("seip.hide_overlay", icon="X").name = CLOUD
+    column.operator("seip.hide_overlay", icon="X").name = last_scan.NAME
 
 
 SENSOR_SHARE = 0.72
@@ -86,8 +79,6 @@ SENSOR_SHARE = 0.72
 
 class SEIP_UL_chosen(RowList, bpy.types.UIList):
     """The sensors of the placement."""
-
-    bl_idname = "SEIP_UL_chosen"
 
     def draw_row(self, layout: bpy.types.UILayout, item: bpy.types.PropertyGroup) -> None:
         """Draw a sensor: label, height, product if there are several, position, and what it sees."""
@@ -106,8 +97,6 @@ class SEIP_UL_chosen(RowList, bpy.types.UIList):
 
 class SEIP_UL_kept(RowList, bpy.types.UIList):
     """Placements that were kept."""
-
-    bl_idname = "SEIP_UL_kept"
 
     def draw_row(self, layout: bpy.types.UILayout, item: bpy.types.PropertyGroup) -> None:
         """Draw a name that can be changed."""
@@ -131,8 +120,8 @@ def draw(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     heading.label(text="Sensor")
     heading.label(text="Sees Alone")
     _draw_list(layout, SEIP_UL_chosen, result, "sensors", "active_sensor")
-    label = result.sensors[result.active_sensor].name if 0 <= result.active_sensor < len(result.sensors) else ""
-    layout.operator("seip.look_from_sensor", icon="HIDE_OFF", text=f"View from {label or 'Sensor'}")
+    text = f"View from {result.active_label() or 'Sensor'}"
+    layout.operator("seip.look_from_sensor", icon="HIDE_OFF", text=text)
     if session.following is None:
         draw_run(layout, "seip.follow_sensors", icon="ORIENTATION_GLOBAL")
     else:
@@ -146,7 +135,7 @@ def _draw_list(
 ) -> None:
     """Draw a list with all its rows: a list that scrolls would take the mouse wheel from the sidebar."""
     rows = max(1, len(getattr(owner, items)))
-    layout.template_list(kind.bl_idname, "", owner, items, owner, active, rows=rows, maxrows=rows)
+    layout.template_list(kind.__name__, "", owner, items, owner, active, rows=rows, maxrows=rows)
 
 
 def _draw_followed(layout: bpy.types.UILayout, following: FollowedSensors) -> None:
@@ -154,8 +143,8 @@ def _draw_followed(layout: bpy.types.UILayout, following: FollowedSensors) -> No
         draw_sentence(layout, following.problem, icon="ERROR", alert=True)
         return
     layout.label(text=_followed_text(following), icon="HIDE_OFF")
-    if following.moved:
-        draw_sentence(layout, f"Moved by hand: {', '.join(following.moved)}.")
+    if edits := sensor_edits(bpy.context.scene).describe():
+        draw_sentence(layout, edits)
 
 
 def _followed_text(following: FollowedSensors) -> str:
@@ -182,18 +171,14 @@ def _draw_comparison(layout: bpy.types.UILayout, context: bpy.types.Context) -> 
         draw_sentence(layout, "Keep this placement with +, place again, and compare the two.", icon="INFO")
         return
     kept, present = seip.kept[seip.active_kept], seip.result
-    try:
-        _draw_table(layout, parsed_record(kept.record), parsed_record(present.record))
-        shares = compared_shares(kept.seen, present.seen) if kept.targets == present.targets else None
-    except SeipError as error:
-        draw_sentence(layout, str(error), icon="ERROR")
+    if draw_reason(layout, complaint(lambda: parsed_record(kept.record))):
         return
-    if shares is None:
-        draw_reason(layout, results.OTHER_TARGETS)
+    _draw_table(layout, parsed_record(kept.record), parsed_record(present.record))
+    if draw_reason(layout, results.OTHER_TARGETS if kept.targets != present.targets else ""):
         return
-    _draw_shares(layout, shares)
-    layout.operator("seip.show_comparison").back = False
-    layout.operator("seip.show_comparison", text="Show Coverage").back = True
+    layout.operator("seip.show_comparison")
+    if (obj := coverage_of(context.scene)) is not None:
+        layout.operator("seip.colour_coverage", text="Show Coverage").aspect = aspects_of(obj)[0]
 
 
 def _draw_table(layout: bpy.types.UILayout, kept: PlacementRecord, present: PlacementRecord) -> None:
@@ -210,16 +195,6 @@ def _draw_table(layout: bpy.types.UILayout, kept: PlacementRecord, present: Plac
     ):
         for text in (name, one, other):
             grid.label(text=text)
-
-
-def _draw_shares(layout: bpy.types.UILayout, shares: tuple[float, ...]) -> None:
-    """Draw which share of the road both placements see, only one of them, and neither."""
-    layout.label(text="Share of the Road")
-    column = layout.column(align=True)
-    for number in (BOTH, KEPT_ONLY, PRESENT_ONLY, NEITHER):
-        row = column.split(factor=0.75)
-        row.label(text=f"  {CLASS_WORDS[number].capitalize()}")
-        row.label(text=f"{shares[number]:.2%}")
 
 
 def _returns(record: PlacementRecord) -> str:

@@ -27,7 +27,7 @@ _DETECTION, _VERIFICATION = ("detect",), ("verify",)
 WORK: Mapping[str, tuple[str, ...]] = {
     "site": (*_SITE, "load_example", "check_site", "install_sumo"),
     "change_site": (*_SITE, "install_sumo"),
-    "placement": ("compute_visibility", "solve_placement", "judge_placement", "compare_scene", "evaluate_sensors"),
+    "placement": ("solve_placement", "judge_placement", "compare_scene", "evaluate_sensors"),
     "results": ("follow_sensors", "show_sight_lines"),
     "view": ("show_sight_lines",),
     "traffic": ("load_traffic", *_SIMULATION, *_SCAN, *_DATASET, *_DETECTION, *_VERIFICATION),

@@ -17,7 +17,7 @@ from ..operators.base import Outcome
 from ..operators.results import no_placement
 from ..scene.materials import REFLECTIVITY
 from ..session import session
-from ..viewport import beam_preview
+from ..viewport import beam_preview, overlays
 from .sections import Status, draw_sections
 from .sidebar import is_narrow, settings_column
 from .wrapped_text import draw_sentence
@@ -243,19 +243,8 @@ def _figures(model: LidarModel) -> list[tuple[str, str]]:
 
 
 def _draw_beams(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
-    """Draw the button, and what the colours of the rings mean."""
-    shown = beam_preview.is_shown()
+    """Draw the button; the legend in the view says what the colours of the rings mean."""
+    shown = overlays.find(context.scene, beam_preview.NAME) is not None
     settings_column(layout).prop(context.scene.seip.survey, "preview_height")
     text = "Hide Beams" if shown else "Show Beams"
     layout.operator("seip.preview_beams", text=text, icon="LIGHT_SPOT", depress=shown)
-    preview = beam_preview.preview_of(context) if shown else None
-    if preview is None:
-        return
-    rosette = preview.model.rosette is not None
-    gap = preview.delta if rosette else 2 * preview.delta
-    to = "a ray" if rosette else "the next ring inwards"
-    draw_sentence(layout, f"{preview.model.name} at {preview.height:.3g} m")
-    draw_sentence(layout, f"Blue: at most {gap:.3g} m to {to}", icon="COLORSET_04_VEC")
-    draw_sentence(layout, "Orange: more; road between may go unseen", icon="COLORSET_02_VEC")
-    before = " in front" if preview.tilt else ""
-    draw_sentence(layout, f"A level road{before} has no gaps up to {preview.resolved_to():.0f} m.")

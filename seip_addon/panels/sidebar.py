@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import bpy
 
 from .. import scene_status
 from ..core.progress import progress_line
+from ..core.workflows.traffic_runs import traffic_folder
+from ..operators.base import is_searching
 from ..session import session
 from ..viewport.overlays import TAB
 from .wrapped_text import MARGIN, draw_sentence, sidebar_width, text_width
@@ -26,24 +30,19 @@ def draw_run(
     """
     running = session.running
     row = layout.row(align=True)
-    if running is None or not is_running(operator):
+    if running is None or running.operator != operator:
         row.active_default = scene_status.next_step(bpy.context.scene) == operator
         row.operator(operator, icon=icon, text=text)
         return
     progress, duration = running.shown
     row.progress(factor=progress.done / progress.total if progress.total else 0.0, text=duration)
-    if running.acceptance is not None and running.acceptance.searching:
+    if is_searching():
         row.operator("seip.accept", text="", icon="CHECKMARK")
     row.operator("seip.stop", text="", icon="X")
     if in_one_row:
         return
     line = progress_line(progress)
     draw_sentence(layout, f"{line[:1].upper()}{line[1:]}")
-
-
-def is_running(operator: str) -> bool:
-    """Return whether an operator's work is under way."""
-    return session.running is not None and session.running.operator == operator
 
 
 FIELD = 34.0
@@ -121,6 +120,11 @@ def draw_path(
     path = getattr(owner, name)
     if text_width(path) > sidebar_width() - MARGIN - FIELD:
         draw_sentence(column, path)
+
+
+def draw_runs(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
+    """Draw the folder with runs of traffic."""
+    draw_path(layout, scene.seip.traffic, "runs", placeholder=traffic_folder(Path(bpy.data.filepath)).name)
 
 
 def is_narrow(context: bpy.types.Context) -> bool:

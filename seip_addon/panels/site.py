@@ -5,14 +5,16 @@ from __future__ import annotations
 import bpy
 
 from .. import preferences, scene_status
+from ..core.output.results.answer import sentence
 from ..core.site.roles import Role
 from ..operators.base import Outcome
-from ..operators.site import SEIP_OT_build_site, has_site, in_short, is_of_choice, missing_for_build
+from ..operators.site import SEIP_OT_build_site, in_short, is_of_choice, missing_for_build
 from ..properties.site import SEIP_PG_site
 from ..scene import roles
+from ..session import session
 from . import sumo
 from .sections import Status, draw_sections
-from .sidebar import draw_path, draw_reason, draw_run, draw_settings, is_narrow, settings_column
+from .sidebar import draw_path, draw_reason, draw_run, draw_settings, settings_column
 from .wrapped_text import ICON, MARGIN, draw_lines, draw_sentence, wrapped
 
 TARGETS = "Targets"
@@ -29,13 +31,12 @@ def status(scene: bpy.types.Scene) -> Status:
     """Return the problems that the check found, the number of targets and the name of the site for the header."""
     if scene_status.has_nothing(scene):
         return Status(result=("none yet",))
-    site = scene.seip.site
-    if not site.checked:
+    check = session.of(scene).check
+    if check is None:
         return Status(result=("not checked", scene.name))
-    targets = (f"{one.value.partition(', ')[0]} points" for one in site.counts if one.name == TARGETS)
-    doubt = scene_status.stale_check(scene)
-    changed = doubt not in {"", scene_status.OLD_CHECK, scene_status.OTHER_SENSORS}
-    return Status(changed, (in_short(site.problems), *targets, scene.name))
+    targets = (f"{value.partition(', ')[0]} points" for what, value in check.found.counts.items() if what == TARGETS)
+    changed = scene_status.stale_check(scene) not in {"", scene_status.OTHER_SENSORS}
+    return Status(changed, (in_short(check.found.problems), *targets, scene.name))
 
 
 def draw(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
@@ -66,7 +67,7 @@ def _draw_map(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
     _draw_place(layout, site)
     draw_sentence(layout, _place_text(site), icon="INFO")
     draw_sections(layout, {"sources": _draw_sources}, site)
-    if has_site(scene) and not missing_for_build(scene):
+    if not (scene_status.has_nothing(scene) or missing_for_build(scene)):
         again = "The site is built again; your own objects and the sensors stay."
         elsewhere = "The site is built in a new scene; this one stays."
         draw_sentence(layout, again if is_of_choice(scene) else elsewhere, icon="INFO")
@@ -167,32 +168,34 @@ def _place_text(site: SEIP_PG_site) -> str:
 
 def _draw_check(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
     """Draw the button and one line, and the problems with a button each."""
-    site = scene.seip.site
+    check = session.of(scene).check
     draw_run(layout, "seip.check_site")
-    if not site.checked:
+    if check is None:
         return
+    problems = check.found.problems
     doubt = scene_status.stale_check(scene)
     if doubt:
         draw_sentence(layout, doubt, icon="INFO" if doubt == scene_status.OTHER_SENSORS else "ERROR")
-    elif not site.problems:
+    elif not problems:
         draw_sentence(layout, "The site is sound.", icon="CHECKMARK")
     else:
-        draw_sentence(layout, f"{in_short(site.problems)}:")
+        draw_sentence(layout, f"{in_short(problems)}:")
     column = layout.column()
     column.active = not doubt
-    for number, problem in enumerate(site.problems):
+    for problem in problems:
         row = column.row()
-        draw_sentence(row.column(), problem.text, icon="CANCEL" if problem.is_error else "ERROR", reserved=SHOW_WIDTH)
+        icon = "CANCEL" if problem.severity == "ERROR" else "ERROR"
+        draw_sentence(row.column(), sentence(problem.text), icon=icon, reserved=SHOW_WIDTH)
         button = row.row()
-        button.enabled = bool(problem.name)
-        button.operator("seip.show_problem", text="", icon="ZOOM_SELECTED").number = number
+        button.enabled = bool(problem.obj)
+        button.operator("seip.show_problem", text="", icon="ZOOM_SELECTED").object = problem.obj
 
 
 def _draw_contents(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
-    site = scene.seip.site
-    draw_reason(layout, "" if site.checked else "Check the site to count its contents.")
-    for one in site.counts:
-        draw_sentence(layout, f"{one.name}: {one.value}")
+    check = session.of(scene).check
+    draw_reason(layout, "" if check is not None else "Check the site to count its contents.")
+    for what, value in check.found.counts.items() if check is not None else ():
+        draw_sentence(layout, f"{what}: {value}")
 
 
 def _draw_roles(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
@@ -204,10 +207,7 @@ def _draw_roles(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     button = row.operator("seip.assign_role", text="Remove", icon="REMOVE")
     button.role, button.remove = site.role, True
     if Role[site.role] in roles.AREAS:
-        row = layout.column(align=True) if is_narrow(context) else layout.row(align=True)
-        for place, text in (("CURSOR", "Draw at Cursor"), ("VIEW", "Draw in View")):
-            button = row.operator("seip.add_area", text=text)
-            button.role, button.place = site.role, place
+        layout.operator("seip.add_area").role = site.role
     if not draw_reason(layout, "" if context.object else "Select objects to give them a role."):
         _draw_object(layout, context.scene, context.object)
 

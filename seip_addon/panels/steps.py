@@ -12,7 +12,6 @@ from .sidebar import Sidebar
 class SEIP_PT_steps(Sidebar, bpy.types.Panel):
     """Panel: the three steps to a placement, each with its status, and what follows; the current step is open."""
 
-    bl_idname = "SEIP_PT_steps"
     bl_label = "Sensor Placement"
 
     def draw(self, context: bpy.types.Context) -> None:

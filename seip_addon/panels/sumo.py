@@ -6,17 +6,20 @@ import bpy
 
 from .. import preferences
 from ..core.sumo_installation import sumo_size
-from ..operators.simulation import SEIP_OT_install_sumo
+from ..operators.traffic import SEIP_OT_install_sumo
 from .sidebar import draw_run
 from .wrapped_text import draw_sentence
 
 
 def draw_missing(layout: bpy.types.UILayout) -> None:
     """Draw that SUMO is missing, and the ways to get it; nothing where it is there."""
-    if preferences.sumo() is not None:
-        return
-    draw_sentence(layout, f"{preferences.NO_SUMO}.", icon="ERROR")
-    draw_installation(layout)
+    if preferences.sumo() is None:
+        draw_status(layout)
+        draw_preferences(layout)
+
+
+def draw_preferences(layout: bpy.types.UILayout) -> None:
+    """Draw the button that shows the add-on's preferences, if it has any."""
     if preferences.own() is not None:
         layout.operator("preferences.addon_show", text="Preferences").module = preferences.ADDON_ID
 

@@ -10,17 +10,15 @@ from .. import preferences
 from ..core.errors import SeipError
 from ..core.output.results.detection_record import MAIN_RULE, DetectionRecord, parsed_detection
 from ..core.workflows.detection import ERRORS
-from ..core.workflows.traffic_runs import traffic_folder
 from ..operators.detection import NO_PYTHON, sensors_key, why_no_detection
-from ..operators.simulation import why_no_simulation
-from ..operators.traffic import why_no_load, why_no_scan
+from ..operators.traffic import why_no_load, why_no_scan, why_no_simulation
 from ..operators.verification import CHANGED as VERIFY_AGAIN
 from ..operators.verification import NO_RECORDING, picture_of, sentences_of, why_no_correction, why_no_verification
 from ..properties.conversion import absolute
 from ..session import session
 from . import sumo
 from .sections import Status, draw_sections
-from .sidebar import draw_path, draw_reason, draw_run, draw_settings
+from .sidebar import draw_path, draw_reason, draw_run, draw_runs, draw_settings
 from .wrapped_text import BOX, draw_sentence
 
 USED = "Detection and placements in traffic use these runs."
@@ -86,10 +84,10 @@ def draw_detection(layout: bpy.types.UILayout, context: bpy.types.Context) -> No
     detection = scene.seip.detection
     why_not = why_no_detection(scene)
     if draw_reason(layout, why_not):
-        if why_not == NO_PYTHON and preferences.own() is not None:
-            layout.operator("preferences.addon_show", text="Preferences").module = preferences.ADDON_ID
+        if why_not == NO_PYTHON:
+            sumo.draw_preferences(layout)
     else:
-        draw_path(layout, detection, "runs", placeholder=traffic_folder(Path(bpy.data.filepath)).name)
+        draw_runs(layout, scene)
         draw_path(layout, detection, "detector", placeholder="Shipped")
         draw_path(layout, detection, "folder")
         draw_run(layout, "seip.detect")

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -61,29 +62,8 @@ def absolute(text: str) -> Path:
     return Path(bpy.path.abspath(text))
 
 
-def runs_folder(named: str) -> Path:
-    """Return the folder with runs of traffic: the one that is named, else that beside the file.
-
-    Raises
-    ------
-    SeipError
-        It is beside the file, and the file has not been saved.
-    """
-    if not bpy.data.filepath and (not named or named.startswith("//")):
-        raise SeipError(
-            "the runs of traffic are beside the file, and the file has not been saved: save it first, or choose "
-            "another folder"
-        )
-    return absolute(named) if named else traffic_folder(Path(bpy.data.filepath))
-
-
-def output_folder(named: str, what: str) -> Path:
-    """Return the folder that results are written to.
-
-    Parameters
-    ----------
-    what : str
-        Is written there.
+def saved_path(named: str, what: str) -> Path:
+    """Return a path for a purpose, "the scans".
 
     Raises
     ------
@@ -93,8 +73,26 @@ def output_folder(named: str, what: str) -> Path:
     if not named:
         raise SeipError(f"name a folder to write {what} to")
     if named.startswith("//") and not bpy.data.filepath:
-        raise SeipError(f"the folder {named} is beside the file, and the file has not been saved: save it first")
+        raise SeipError(
+            f"the path {named} of {what} is beside the file, and the file has not been saved: save it first, or "
+            "choose another"
+        )
     return absolute(named)
+
+
+def runs_folder(named: str) -> Path:
+    """Return the folder with runs of traffic: the one that is named, else that beside the file; see `saved_path`."""
+    path = saved_path(named or "//", "the runs of traffic")
+    return path if named else traffic_folder(Path(bpy.data.filepath))
+
+
+def complaint(read: Callable[[], object]) -> str:
+    """Return the sentence of the `SeipError` that a function raises, or ""."""
+    try:
+        read()
+    except SeipError as error:
+        return str(error)
+    return ""
 
 
 def as_typed(value: float) -> float:

@@ -11,17 +11,15 @@ from .. import selection
 from ..core.choosing.placement.objective import DEFAULT_COUNT, Objective
 from ..core.choosing.placement.scenarios import Scenarios
 from ..core.sensing.scenarios.pose_errors import MAX_ANGLE_STD, PoseErrors
-from .conversion import as_typed, of_setting, path_property
+from .conversion import as_typed, of_setting
+
+RULE_ITEMS = (("MANDATORY", "Sensor", "There must be a sensor"), ("FORBIDDEN", "No sensor", "There must be none"))
 
 
 class SEIP_PG_position_rule(bpy.types.PropertyGroup):
     """A position with a demand of its own; its name is the position's."""
 
-    rule: EnumProperty(
-        name="Rule",
-        description="Requirement at this position",
-        items=(("MANDATORY", "Sensor", "There must be a sensor"), ("FORBIDDEN", "No sensor", "There must be none")),
-    )
+    rule: EnumProperty(name="Rule", description="Requirement at this position", items=RULE_ITEMS)
 
 
 class SEIP_PG_goal(bpy.types.PropertyGroup):
@@ -103,12 +101,6 @@ class SEIP_PG_goal(bpy.types.PropertyGroup):
             ("worst", "Worst Sensor", "The sensor that matters most has failed"),
             ("mean", "Any Sensor", "Mean over the failures of each sensor"),
         ),
-    )
-    runs: path_property(
-        "Runs",
-        "Folder with two or more runs of traffic (.npz); the last third of the runs is for evaluation. "
-        "Empty for the folder SCENE_traffic beside the file",
-        folder=True,
     )
     rules: CollectionProperty(type=SEIP_PG_position_rule)
     active_rule: IntProperty(name="Position")

@@ -13,10 +13,9 @@ from ..scene_status import FILE_VERSION
 from ..viewport import coverage
 from .conversion import path_property
 from .placement import SEIP_PG_goal
-from .simulation import SEIP_PG_simulation
 from .site import SEIP_PG_site
 from .survey import SEIP_PG_survey
-from .traffic import SEIP_PG_traffic
+from .traffic import SEIP_PG_simulation, SEIP_PG_traffic
 
 
 class SEIP_PG_chosen(bpy.types.PropertyGroup):
@@ -50,6 +49,11 @@ class SEIP_PG_result(SEIP_PG_placement):
         default=False,
     )
 
+    def active_label(self) -> str:
+        """Return the label of the sensor that is active in the list, or ""."""
+        number = self.active_sensor
+        return self.sensors[number].name if number in range(len(self.sensors)) else ""
+
     def keep(self, record: str, targets: str, seen: str) -> None:
         """Keep a placement as the current one, with a row for each of its sensors."""
         self.record, self.targets, self.seen = record, targets, seen
@@ -61,12 +65,6 @@ class SEIP_PG_result(SEIP_PG_placement):
 class SEIP_PG_detection(bpy.types.PropertyGroup):
     """Settings of detection, and the latest figures."""
 
-    runs: path_property(
-        "Runs",
-        "Folder with runs of traffic (.npz) to detect road users in, four or more for an interval. "
-        "Empty for the folder SCENE_traffic beside the file",
-        folder=True,
-    )
     detector: path_property(
         "Detector", "A trained detector (.pt) of your own; empty for the one that comes with the project"
     )
@@ -93,8 +91,8 @@ class SEIP_PG_verification(bpy.types.PropertyGroup):
     )
 
 
-def _recolour(_own: object, context: bpy.types.Context) -> None:
-    last_scan.show_cloud(context.scene)
+def _recolour(own: bpy.types.PropertyGroup, _context: object) -> None:
+    last_scan.show_cloud(own.id_data)
 
 
 def _show_legend(own: bpy.types.PropertyGroup, _context: object) -> None:

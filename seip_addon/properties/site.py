@@ -1,4 +1,4 @@
-"""Properties of the site: sources, results of the check, weights and rules of objects."""
+"""Properties of the site: sources, weights and rules of objects."""
 
 from __future__ import annotations
 
@@ -6,9 +6,8 @@ from pathlib import Path
 from typing import Any
 
 import bpy
-from bpy.props import BoolProperty, CollectionProperty, EnumProperty, FloatProperty, StringProperty
+from bpy.props import CollectionProperty, EnumProperty, FloatProperty, StringProperty
 
-from ..core.errors import SeipError
 from ..core.site.scene_geometry import DEFAULT_WEIGHT
 from ..core.workflows.site_building import SiteRequest
 from ..core.world.elevation.at_place import TerrainRequest
@@ -18,7 +17,7 @@ from ..core.world.streetscape.description import DEFAULT_RADIUS
 from ..core.world.streetscape.site_file import DESCRIPTION_SUFFIX
 from ..preferences import overpass, sumo_folders
 from ..scene import contract, roles
-from .conversion import absolute, as_typed, of_setting, path_property
+from .conversion import absolute, as_typed, complaint, of_setting, path_property
 
 _FILE = {"subtype": "FILE_PATH", "options": {"PATH_SUPPORTS_BLEND_RELATIVE"}}
 _CODE = {"min": 0, "max": 999_999}
@@ -30,24 +29,11 @@ class SEIP_PG_junction(bpy.types.PropertyGroup):
     id: StringProperty(name="Id", description="Junction id in the map, or latitude and longitude")
 
 
-class SEIP_PG_count(bpy.types.PropertyGroup):
-    """A count of the check; its name is the counted item."""
-
-    value: StringProperty(name="Count", description="Count")
-
-
-class SEIP_PG_problem(bpy.types.PropertyGroup):
-    """A problem of the site; its name is that of the object concerned, or empty."""
-
-    is_error: BoolProperty(name="Error", description="Problem that prevents a placement")
-    text: StringProperty(name="Problem", description="Problem and its cure")
-
-
 ROLE_ITEMS = tuple((role.name, role.value.capitalize(), f"{roles.WORDS[role].capitalize()}") for role in roles.ROLES)
 
 
 class SEIP_PG_site(bpy.types.PropertyGroup):
-    """Sources of the site, and the results of its check."""
+    """Sources of the site."""
 
     source: path_property("Map", "OpenDRIVE map, site description that names one, or extract of OpenStreetMap")
     new_site: StringProperty(
@@ -87,9 +73,6 @@ class SEIP_PG_site(bpy.types.PropertyGroup):
     terrain: of_setting(TerrainRequest, "path", "Terrain", **_FILE)
     terrain_epsg: of_setting(TerrainRequest, "epsg", "EPSG", default=0, **_CODE)
     role: EnumProperty(name="Role", description="Role of objects in the placement", items=ROLE_ITEMS)
-    checked: BoolProperty(name="Checked", description="Result of a check is available")
-    counts: CollectionProperty(type=SEIP_PG_count)
-    problems: CollectionProperty(type=SEIP_PG_problem)
 
     def is_described(self) -> bool:
         """Return whether a site description gives the place and its size."""
@@ -101,11 +84,7 @@ class SEIP_PG_site(bpy.types.PropertyGroup):
 
     def wrong_position(self, text: str) -> str:
         """Return what is wrong with a position, or ""."""
-        try:
-            parsed_position(text)
-        except SeipError as error:
-            return str(error)
-        return ""
+        return complaint(lambda: parsed_position(text))
 
     def has_place(self) -> bool:
         """Return whether enough is chosen to build a site: a map has a middle, an extract none."""

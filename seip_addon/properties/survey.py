@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 
 import bpy
 from bpy.props import BoolProperty, CollectionProperty, EnumProperty, FloatProperty, StringProperty
 
 from ..core.choosing.placement.search_limits import DEFAULT_EFFORT
-from ..core.errors import SeipError
 from ..core.output.results.placement_record import RecordedSettings
 from ..core.sensing.visibility.settings import VisibilitySettings
 from ..core.sensing.weather import Weather
@@ -18,7 +17,7 @@ from ..core.site.installed_cost import InstalledCost, load_installed_cost
 from ..core.site.post_rules import ALLOWED, ASSUMED_POLES, RULES
 from ..core.workflows.survey_settings import SurveySettings
 from ..preferences import catalogue_files
-from .conversion import absolute, as_typed, of_setting
+from .conversion import absolute, as_typed, complaint, of_setting
 
 _CANDIDATES = CandidateSettings()
 
@@ -127,11 +126,11 @@ class SEIP_PG_survey(bpy.types.PropertyGroup):
 
     def wrong_heights(self) -> str:
         """Say what is wrong with the heights, or nothing."""
-        return _complaint(lambda: CandidateSettings(heights=heights_of(self.heights.split())))
+        return complaint(lambda: CandidateSettings(heights=heights_of(self.heights.split())))
 
     def wrong_tilts(self) -> str:
         """Say what is wrong with the tilts, or nothing."""
-        return _complaint(lambda: CandidateSettings(tilts=tilts_of(self.tilts.split())))
+        return complaint(lambda: CandidateSettings(tilts=tilts_of(self.tilts.split())))
 
     def weather(self) -> Weather:
         """Return the weather that sensors look through."""
@@ -184,11 +183,3 @@ class SEIP_PG_survey(bpy.types.PropertyGroup):
         if not self.installed:
             return None
         return load_installed_cost(absolute(self.installed_cost) if self.installed_cost else None)
-
-
-def _complaint(read: Callable[[], object]) -> str:
-    try:
-        read()
-    except SeipError as error:
-        return str(error)
-    return ""

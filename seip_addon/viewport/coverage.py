@@ -70,7 +70,6 @@ def set_shading(space: bpy.types.SpaceView3D) -> None:
     space.shading.color_type = "MATERIAL"
 
 
-@bpy.app.handlers.persistent  # type: ignore[untyped-decorator]
 def _after_load(*_: object) -> None:
     """Show what was shown when the file was saved."""
     for scene in bpy.data.scenes:

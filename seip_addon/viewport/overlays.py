@@ -51,7 +51,7 @@ def draw_overlays(scene: bpy.types.Scene) -> None:
     gpu.state.depth_test_set("LESS_EQUAL")
     gpu.state.blend_set("ALPHA")
     for overlay in overlays_of(scene):
-        for layer in overlay.layers:
+        for layer in (*overlay.layers, *overlay.moving()):
             layer.draw(bpy.context.preferences.system.ui_scale)
     gpu.state.blend_set("NONE")
     gpu.state.depth_test_set("NONE")

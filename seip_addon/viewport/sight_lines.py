@@ -34,7 +34,7 @@ def sight_overlay(sight: SightLines, label: str) -> Overlay:
             Entry(f"{len(sight.missed):,} in view, but between beams or too faint", (_opaque(MISSED),)),
         ),
     )
-    return Overlay(layers, lambda _scene: block, label)
+    return Overlay(layers, lambda _scene: block)
 
 
 def _faces(squares: Float) -> NDArray[np.float32]:

@@ -55,7 +55,7 @@ def full_scan(scene: bpy.types.Scene) -> np.ndarray:
     """Return which targets the sensors see as followed sensors do, which go another way through the code."""
     bpy.ops.seip.follow_sensors()
     seen = np.sum([row for _, row, _ in session.following.sensors.values()], axis=0)
-    assert session.following.moved == ()
+    assert not sensor_edits(scene)
     live_coverage.stop()
     return seen
 
@@ -200,7 +200,7 @@ def test_an_export_that_fails_or_is_stopped_leaves_the_earlier_one_whole(placed,
     assert before.keys() == {*FILES, "visibility.npz"} - {"view.png"}
     placed.seip.goal.count = 1
     bpy.ops.seip.solve_placement()
-    work = bpy.types.SEIP_OT_export_result.prepare(type("Operator", (), {})(), placed)
+    work = next(bpy.types.SEIP_OT_export_result.job(None, placed))
     for _ in range(3):
         next(work)
     work.close()  # as Stop does

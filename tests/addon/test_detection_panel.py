@@ -7,7 +7,6 @@ import sys
 import time
 from concurrent.futures import CancelledError
 from pathlib import Path
-from types import SimpleNamespace
 from unittest.mock import MagicMock
 
 import bpy
@@ -141,13 +140,13 @@ def no_sensors(scene, folder):
 
 def no_runs(scene, folder):
     (folder / "runs").mkdir()
-    scene.seip.detection.runs = str(folder / "runs")
+    scene.seip.traffic.runs = str(folder / "runs")
 
 
 @pytest.mark.parametrize(
     ("wrong", "words"),
     [
-        (no_sensors, "There is no sensor to detect road users with: place sensors first"),
+        (no_sensors, "There is no sensor in the scene: place sensors first"),
         (no_runs, r"there is no run of traffic \(\.npz\) in .*runs: choose another folder"),
     ],
 )
@@ -180,7 +179,7 @@ def test_work_that_is_stopped_ends_the_command_and_leaves_nothing(placed, stand_
     package = stand_in(
         end="sys.stderr.write('detect in run-1: 25% done, 6 s left\\n'); sys.stderr.flush(); time.sleep(99)"
     )
-    work = Background(SEIP_OT_detect.prepare(SimpleNamespace(), placed))
+    work = Background(next(SEIP_OT_detect.job(None, placed)))
     end = time.monotonic() + 30
     while (work.progress.done, work.progress.total) != (25, 100) and time.monotonic() < end:
         time.sleep(0.05)

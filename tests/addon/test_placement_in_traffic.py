@@ -72,7 +72,7 @@ def test_evaluate_only_states_what_traffic_leaves_of_the_placement_for_the_empty
 
 
 def test_runs_are_read_in_work_that_can_be_stopped(coarse):
-    work = SEIP_OT_solve_placement.prepare(SimpleNamespace(), coarse)
+    work = next(SEIP_OT_solve_placement.job(SimpleNamespace(), coarse))
     assert any(progress.what == "reading runs of traffic" for progress in work)
     work.close()
     assert session.of(coarse).state is None
@@ -109,7 +109,7 @@ def test_runs_that_are_of_no_use_are_refused_before_any_ray_is_cast(coarse, tmp_
     folder = tmp_path / "runs"
     folder.mkdir()
     wrong(folder)
-    coarse.seip.goal.runs = str(folder)
+    coarse.seip.traffic.runs = str(folder)
     with pytest.raises(RuntimeError, match=words):
         bpy.ops.seip.solve_placement()
     assert not coarse.seip.result.record

@@ -9,6 +9,7 @@ from types import SimpleNamespace
 from headless import place
 
 import bpy
+import numpy as np
 import pytest
 
 from seip_addon import scene_status, sensor_types
@@ -21,6 +22,7 @@ from seip_addon.panels import export as export_panel
 from seip_addon.panels import placement as placement_panel
 from seip_addon.scene.sensors import placed_sensors
 from seip_addon.session import session
+from seip_addon.viewport.search import search_overlay
 from tests.builders.drawn_layout import DrawnLayout
 
 OPTIONS = ["--heights", "8", "--grid", "4", "--spacing", "12", "--count", "2", "--sensor", "type1", "--no-render"]
@@ -113,7 +115,7 @@ def test_another_goal_makes_placing_the_next_step(junction, monkeypatch):
 
 
 def test_a_placement_with_the_grid_at_hand_casts_no_ray(junction, monkeypatch):
-    bpy.ops.seip.compute_visibility()
+    bpy.ops.seip.solve_placement()
     for caster in (BvhRayCaster, EmbreeRayCaster):
         monkeypatch.setattr(caster, "cast", None)
     assert bpy.ops.seip.solve_placement() == {"FINISHED"}
@@ -121,7 +123,25 @@ def test_a_placement_with_the_grid_at_hand_casts_no_ray(junction, monkeypatch):
 
 def work_of(operator: str, scene: bpy.types.Scene) -> Generator[Progress, None, object]:
     """Return the work of a button, which a thread would do."""
-    return getattr(bpy.types, operator).prepare(SimpleNamespace(), scene)
+    return next(getattr(bpy.types, operator).job(SimpleNamespace(), scene))
+
+
+def test_the_best_so_far_is_drawn_and_taken_away_again(junction):
+    """What the search reports are the poses of the placement it ends with, and no object is written for them."""
+    objects = set(bpy.data.objects)
+    steps = []
+    placed = finish(work_of("SEIP_OT_solve_placement", junction), steps.append)
+    found = [step for step in steps if step.poses]
+    assert found[-1].poses == tuple(sorted(placed.solution.placement.chosen.tolist()))
+    assert found[0].what.startswith("visibility")  # the early answer
+    posts, eyes = (overlay := search_overlay(placed.layout, found[-1])).layers
+    placed_eyes = sorted(sensor.xyz.tolist() for sensor in placed.solution.deployment.sensors)
+    np.testing.assert_allclose(sorted(eyes.positions.tolist()), placed_eyes, atol=1e-4)
+    assert posts.positions[1::2].tolist() == eyes.positions.tolist()
+    assert [words for words, _ in overlay.labels(junction)] == ["Type 1", "Type 1"]
+    assert overlay.legend(junction).entries[0].words == f"best so far: {found[-1].best}"
+    assert set(bpy.data.objects) == objects
+    assert not session.overlays
 
 
 def test_work_that_is_stopped_at_its_end_leaves_no_trace(junction):
@@ -132,7 +152,7 @@ def test_work_that_is_stopped_at_its_end_leaves_no_trace(junction):
     seen = dict(vars(before))
     placed = finish(work_of("SEIP_OT_solve_placement", junction))
     assert len(placed.solution.deployment.sensors) == 3
-    for name in ("compute_visibility", "follow_sensors", "save_picture"):
+    for name in ("follow_sensors", "save_picture"):
         finish(work_of(f"SEIP_OT_{name}", junction))
         assert session.of(junction).state is before
         assert vars(before) == seen

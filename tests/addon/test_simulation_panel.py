@@ -3,16 +3,14 @@
 import re
 import shutil
 from pathlib import Path
-from types import SimpleNamespace
 
 from headless import traffic
 
 import bpy
 import pytest
 
-from seip_addon.operators.simulation import SEIP_OT_simulate_traffic
+from seip_addon.operators.traffic import SEIP_OT_simulate_traffic
 from seip_addon.panels import traffic as traffic_panel
-from seip_addon.session import session
 from tests.builders.drawn_layout import DrawnLayout
 from tests.builders.osm_text import crossing
 from tests.sumo_here import needs_sumo
@@ -45,11 +43,10 @@ def drawn():
 def test_runs_are_those_of_the_command_and_used_by_the_next_buttons(site, tmp_path):
     assert dict(drawn().properties)["map"]["placeholder"] == "junction.xodr"
     assert bpy.ops.seip.simulate_traffic() == {"FINISHED"}
-    scene, seip = site, site.seip
-    assert (seip.detection.runs, seip.goal.runs) == ("//seip-traffic/", "//seip-traffic/")
+    seip = site.seip
+    assert seip.traffic.runs == "//seip-traffic/"
     assert seip.traffic.file == "//seip-traffic/run-1.npz"
-    users = len(session.of(scene).traffic.trajectories)
-    assert len(bpy.data.collections["SEIP Traffic"].objects) == users
+    users = len(bpy.data.collections["SEIP Traffic"].objects)
     assert seip.traffic.loaded.startswith(f"{users} road users, 0 to 4.8 s")
     assert bpy.ops.seip.load_traffic() == {"FINISHED"}
     text = drawn().text
@@ -91,12 +88,12 @@ def test_a_map_of_another_place_is_refused_and_nothing_is_written(site, tmp_path
     ):
         bpy.ops.seip.simulate_traffic()
     assert not (tmp_path / "seip-traffic").exists()
-    assert not site.seip.detection.runs
+    assert not site.seip.traffic.runs
 
 
 @needs_sumo
 def test_stopped_simulation_leaves_nothing(site, tmp_path):
-    work = SEIP_OT_simulate_traffic.prepare(SimpleNamespace(), site)
+    work = next(SEIP_OT_simulate_traffic.job(None, site))
     assert next(work).what == "simulating run 1 of 2"
     next(work)
     work.close()

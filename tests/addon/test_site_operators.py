@@ -8,11 +8,14 @@ import bpy
 import numpy as np
 import pytest
 
+from seip_addon.core.output.results.answer import sentence
 from seip_addon.core.site.installed_cost import load_installed_cost
+from seip_addon.core.site.obstruction import NO_OBSTACLES_MESSAGE
 from seip_addon.core.world.elevation.at_place import TerrainRequest
 from seip_addon.panels import placement
 from seip_addon.scene import contract
 from seip_addon.scene.read import read_scene
+from seip_addon.session import session
 from tests.builders.drawn_layout import DrawnLayout
 
 SCENES = Path(__file__).resolve().parents[2] / "scenes"
@@ -83,14 +86,16 @@ def test_a_site_of_a_map_without_obstacles_says_so_where_sensors_are_placed(scen
     choose(scene, radius=20.0)
     bpy.ops.seip.build_site()
     bpy.ops.seip.check_site()
-    assert placement.BARE in [one.text for one in scene.seip.site.problems]
+    bare = sentence(NO_OBSTACLES_MESSAGE)
     layout = DrawnLayout()
     placement.draw(layout, bpy.context)
-    assert placement.BARE in " ".join(layout.text.split())
+    assert bare in " ".join(layout.text.split())
     bpy.ops.mesh.primitive_cube_add(size=8.0, location=(6.0, 10.0, 4.0))
     contract.find(scene, contract.OCCLUDERS).objects.link(bpy.context.object)
     bpy.ops.seip.check_site()
-    assert placement.BARE not in [one.text for one in scene.seip.site.problems]
+    layout = DrawnLayout()
+    placement.draw(layout, bpy.context)
+    assert bare not in " ".join(layout.text.split())
 
 
 @pytest.mark.parametrize(
@@ -164,14 +169,12 @@ def test_the_check_lists_and_shows(junction):
     pole = contract.find(scene, contract.POLES).objects[0]
     pole.location.z += 3.0
     assert bpy.ops.seip.check_site() == {"FINISHED"}
-    site = scene.seip.site
-    assert site.checked
-    assert {one.name for one in site.counts} >= {"Region", "Roads", "Poles", "Targets", "Positions", "Poses"}
-    number = [one.name for one in site.problems].index(pole.name)
-    assert not site.problems[number].is_error
-    assert bpy.ops.seip.show_problem(number=number) == {"FINISHED"}
+    found = session.of(scene).check.found
+    assert found.counts.keys() >= {"Region", "Roads", "Poles", "Targets", "Positions", "Poses"}
+    assert [one.severity for one in found.problems if one.obj == pole.name] == ["WARNING"]
+    assert bpy.ops.seip.show_problem(object=pole.name) == {"FINISHED"}
     assert bpy.context.object == pole
     assert bpy.context.selected_objects == [pole]
     pole.hide_set(True)
     with pytest.raises(RuntimeError, match="is hidden"):
-        bpy.ops.seip.show_problem(number=number)
+        bpy.ops.seip.show_problem(object=pole.name)

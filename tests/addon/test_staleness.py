@@ -12,12 +12,12 @@ from seip_addon.session import SceneState, session
 
 @pytest.fixture
 def known(junction):
-    bpy.ops.seip.compute_visibility()
+    bpy.ops.seip.solve_placement()
     return session.of(junction).state
 
 
 def read_again(known: SceneState) -> bool:
-    bpy.ops.seip.compute_visibility()
+    bpy.ops.seip.solve_placement()
     return session.of(bpy.context.scene).state.layout.geometry is not known.layout.geometry
 
 
@@ -56,10 +56,11 @@ def forbid() -> None:
 def test_a_scene_that_no_longer_counts_in_metres_is_refused_although_it_was_read_before(known):
     scene = bpy.context.scene
     scene.unit_settings.system, scene.unit_settings.scale_length = "METRIC", 0.01
-    for operator in (bpy.ops.seip.compute_visibility, bpy.ops.seip.solve_placement):
-        with pytest.raises(RuntimeError, match=r"is 0\.01 m, but is read as one metre: set Unit Scale to 1"):
-            operator()
-    assert not scene.seip.result.record
+    record = scene.seip.result.record
+    scene.seip.goal.count = 1
+    with pytest.raises(RuntimeError, match=r"is 0\.01 m, but is read as one metre: set Unit Scale to 1"):
+        bpy.ops.seip.solve_placement()
+    assert scene.seip.result.record == record
     scene.unit_settings.scale_length = 1.0
     assert bpy.ops.seip.solve_placement() == {"FINISHED"}
 
@@ -79,7 +80,7 @@ def test_a_change_that_is_undone_is_noticed(known):
     bpy.ops.ed.undo_push(message="before")
     reshape()
     bpy.ops.ed.undo_push(message="after")
-    bpy.ops.seip.compute_visibility()
+    bpy.ops.seip.solve_placement()
     reshaped = session.of(bpy.context.scene).state
     bpy.ops.ed.undo()
     assert read_again(reshaped)
@@ -180,4 +181,4 @@ def test_a_check_holds_until_scene_or_settings_change(known, tmp_path):
     bpy.context.view_layer.update()
     assert scene_status.stale_check(scene) == "The scene has changed since the check."
     bpy.ops.seip.check_site()
-    assert scene_status.stale_check(reopened(tmp_path)) == scene_status.OLD_CHECK
+    assert site.status(reopened(tmp_path)).result[0] == "not checked"

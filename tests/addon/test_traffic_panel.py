@@ -100,6 +100,6 @@ def test_each_mistake_has_its_sentence(placed, tmp_path):
             bpy.ops.seip.write_dataset()
     traffic.folder = folder
     bpy.data.batch_remove(bpy.data.collections["SEIP Sensors"].objects)
-    with pytest.raises(RuntimeError, match="There is no sensor to scan with"):
+    with pytest.raises(RuntimeError, match="There is no sensor in the scene"):
         bpy.ops.seip.write_dataset()
     assert not (tmp_path / "run").exists()

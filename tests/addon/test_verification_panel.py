@@ -143,16 +143,12 @@ def test_a_moved_object_makes_the_verification_old(verified):
 
 def test_stopped_work_leaves_nothing(placed, tmp_path):
     operator = SEIP_OT_verify
-    steps = operator.prepare(_Stub(), placed)
+    steps = next(operator.job(None, placed))
     for _ in range(25):
         next(steps)
     steps.close()
     assert not (tmp_path / "out").exists()
     assert session.of(placed).verification is None
-
-
-class _Stub:
-    """Stands in for an operator that Blender would make."""
 
 
 def no_sensors(scene, folder):
@@ -172,7 +168,7 @@ def other_names(scene, folder):
 @pytest.mark.parametrize(
     ("wrong", "words"),
     [
-        (no_sensors, "There is no sensor to verify: place sensors first"),
+        (no_sensors, "There is no sensor in the scene: place sensors first"),
         (no_such_recording, "no such file or folder: .*nowhere"),
         (other_names, "the plan has the sensors S1, S2, but the recording has north"),
     ],

@@ -11,7 +11,7 @@ from seip_addon.core.output.pictures.plan_view import DPI, MAP_WIDTH, MARGIN
 from seip_addon.operators import view
 from seip_addon.scene.sensors import placed_sensors
 from seip_addon.session import session
-from seip_addon.viewport import overlays, picture
+from seip_addon.viewport import overlays
 from seip_addon.viewport.coverage import legend_of_coverage
 from seip_addon.viewport.sight_lines import NAME as SIGHT
 
@@ -40,7 +40,8 @@ def test_coverage_is_coloured_with_a_legend(placed):
 def test_sight_lines_are_the_row_of_the_grid(placed):
     held = session.of(placed).state
     sensor = held.solution.deployment.sensors[1]
-    assert bpy.ops.seip.show_sight_lines(sensor=sensor.label) == {"FINISHED"}
+    placed.seip.result.active_sensor = 1
+    assert bpy.ops.seip.show_sight_lines() == {"FINISHED"}
     overlay = overlays.find(placed, SIGHT)
     hidden, missed, lines = overlay.layers
     row = held.survey.grid.visible[sensor.pose]
@@ -51,18 +52,18 @@ def test_sight_lines_are_the_row_of_the_grid(placed):
     unseen = len(hidden.positions) + len(missed.positions)
     assert unseen == 6 * (~row & (distance <= sensor.model.max_range)).sum()
     title, *words = overlay.legend(placed).title, *(entry.words for entry in overlay.legend(placed).entries)
+    assert title.startswith(sensor.label)
     assert title.endswith(f"{row.sum() + unseen // 6:,} targets in its range")
     assert words[1:] == [
         f"{len(hidden.positions) // 6:,} hidden by something",
         f"{len(missed.positions) // 6:,} in view, but between beams or too faint",
     ]
-    assert overlay.about == sensor.label
 
 
 @pytest.mark.parametrize("ending", ["another file", "unregister"])
 def test_draw_handlers_are_always_removed(placed, ending):
     bpy.ops.seip.colour_coverage(aspect="times")
-    bpy.ops.seip.show_sight_lines(sensor="S1")
+    bpy.ops.seip.show_sight_lines()
     assert handler_count() == 2
     if ending == "another file":
         bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
@@ -73,11 +74,10 @@ def test_draw_handlers_are_always_removed(placed, ending):
         seip_addon.register()
 
 
-def test_a_picture_has_the_view_and_the_plan(placed, tmp_path, monkeypatch):
-    monkeypatch.setattr(picture, "view_pixels", lambda *_: np.zeros((540, 960, 3), dtype=np.uint8))
+def test_a_picture_has_the_view_and_the_plan(placed, tmp_path):
     for _ in range(2):
         path = view._free(view._named(str(tmp_path / "report.png")))  # noqa: SLF001  # as the operator names it
-        view.save_viewport_sheet(path, placed, None, session.of(placed).state)
+        view.save_viewport_sheet(path, session.of(placed).state, np.zeros((540, 960, 3), dtype=np.uint8))
     assert sorted(path.name for path in tmp_path.glob("*.png")) == ["report-2.png", "report.png"]
     with Image.open(tmp_path / "report.png") as sheet:
         plan = round(DPI * (MAP_WIDTH + 2 * MARGIN))

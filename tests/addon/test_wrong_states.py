@@ -39,7 +39,7 @@ def linked(add_on, small_scene):
 
 
 def test_a_linked_scene_is_not_written_into(linked):
-    for button in ("compute_visibility", "solve_placement", "add_area", "assign_role", "load_traffic"):
+    for button in ("solve_placement", "add_area", "assign_role", "load_traffic"):
         with pytest.raises(RuntimeError, match="linked from another file"):
             getattr(bpy.ops.seip, button)()
 
@@ -84,7 +84,7 @@ def test_a_cache_that_cannot_be_written_is_named_before_anything_is_cast(junctio
     file.touch()
     monkeypatch.setattr(preferences, "cache_folder", lambda: file)
     with pytest.raises(RuntimeError, match=r"cannot write to .*file.* as Cache in the add-on's preferences"):
-        bpy.ops.seip.compute_visibility()
+        bpy.ops.seip.solve_placement()
 
 
 def endless():

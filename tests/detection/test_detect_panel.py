@@ -46,7 +46,7 @@ def test_panel_and_command_give_the_same_files(placed, small_scene, tmp_path):
     runs = tmp_path / "runs"
     runs.mkdir()
     shutil.copy(small_scene.parent / "small_traffic" / "run-1.npz", runs)
-    placed.seip.detection.runs = str(runs)
+    placed.seip.traffic.runs = str(runs)
     assert bpy.ops.seip.detect() == {"FINISHED"}
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "placed.blend"), copy=True)
     named = ["--detector", placed.seip.detection.detector, "--traffic", str(runs / "run-1.npz")]

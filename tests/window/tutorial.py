@@ -23,6 +23,7 @@ import bpy
 from bl_ext.user_default.seip.seip_addon import preferences, scene_status
 from bl_ext.user_default.seip.seip_addon.panels import placement, results, sidebar
 from bl_ext.user_default.seip.seip_addon.session import SceneState, session
+from bl_ext.user_default.seip.seip_addon.viewport import search
 from driver import Steps, Window, play
 from mathutils import Vector
 
@@ -85,9 +86,9 @@ def _load_example(window: Window) -> Steps:
     yield from window.open_sidebar("SEIP")
     yield from window.picture("1-sidebar")
     yield from window.click_in_view("seip.load_example(")
-    yield from window.until(lambda: session.running is None and _scene().seip.site.checked, 120)
+    yield from window.until(lambda: session.running is None and session.of(_scene()).check, 120)
     yield 1.0
-    assert not _scene().seip.site.problems, [one.text for one in _scene().seip.site.problems]
+    assert not session.of(_scene()).check.found.problems
     assert not {"Cube", "Light"} & set(_scene().objects.keys())
     bpy.ops.wm.save_as_mainfile(filepath=str(OUT / "example.blend"), copy=True)  # for the batch command
     bpy.ops.wm.save_as_mainfile(filepath=str(OUT / "junction.blend"))
@@ -140,7 +141,11 @@ def _place(window: Window) -> Steps:
     assert _known() is None or _known().survey is None, "the run that was stopped went on"
     SAID.clear()
     yield from window.press("LEFTMOUSE", button)
+    yield from window.until(_drawn, 60)
+    yield from window.shot("5-searching")
+    assert not _sensors(), "sensors were written before the search ended"
     yield from window.until(lambda: _scene().seip.result.record, 300)
+    assert not _drawn(), "the best so far is still drawn"
     assert any(FIRST_ANSWER.match(sentence) for sentence in SAID), "no answer was shown before the search"
     assert len(_sensors()) == 2, _sensors()
     (OUT / "placement.json").write_text(_scene().seip.result.record, encoding="utf-8")
@@ -267,7 +272,7 @@ def _simulate(window: Window) -> Steps:
     yield from window.until((runs / "run-4.npz").exists, 300)
     yield from window.until(lambda: session.running is None, 10)
     assert _scene().seip.traffic.file == "//seip-traffic/run-1.npz", _scene().seip.traffic.file
-    assert _scene().seip.detection.runs == _scene().seip.goal.runs == "//seip-traffic/"
+    assert _scene().seip.traffic.runs == "//seip-traffic/"
     yield from window.press("Z", ctrl=True)
     yield from window.until(lambda: _scene().seip.traffic.file == loaded, 5)
     yield from window.press("Z", ctrl=True, shift=True)
@@ -290,7 +295,7 @@ def _import_map(window: Window) -> Steps:
     yield from window.shot("12-dialog")
     yield from window.press("RET")
     yield from window.until(lambda: session.running is None and set(bpy.data.scenes) - before, 120)
-    yield from window.until(lambda: session.running is None and _scene().seip.site.checked, 60)
+    yield from window.until(lambda: session.running is None and session.of(_scene()).check, 60)
     assert _scene() not in before
 
 
@@ -341,6 +346,11 @@ def _record() -> dict[str, Any]:
 
 def _known() -> SceneState | None:
     return session.of(_scene()).state
+
+
+def _drawn() -> bool:
+    """Tell whether the best placement so far is drawn in the view."""
+    return search.NAME in session.overlays.get(_scene().session_uid, {})
 
 
 def _sensors() -> list[bpy.types.Object]:

@@ -19,12 +19,15 @@ from seip_addon.core.workflows.returns import SurveyReturns
 def test_it_is_the_optimum_where_all_poses_are_among_the_few(small_survey, tmp_path, criterion):
     objective = Objective(count=2, criterion=criterion)
     said = []
-    solution = finish(place(small_survey, objective), lambda progress: said.append(progress.best))
+    solution = finish(place(small_survey, objective), said.append)
     assert solution.placement.status == "optimal"
     layout = small_survey
     few = early.few_poses(layout, objective)
     np.testing.assert_array_equal(few, np.arange(len(layout.site.candidates)))
-    assert finish(early.early_answer(layout, objective, tmp_path / "none.npz")) == list(filter(None, said))[-1]
+    answer = finish(early.early_answer(layout, objective, tmp_path / "none.npz"))
+    (last,) = [step for step in said if step.best][-1:]
+    assert (answer.best, answer.poses) == (last.best, last.poses)
+    assert answer.poses == tuple(sorted(solution.placement.chosen.tolist()))
 
 
 def test_it_is_the_value_of_a_placement_of_the_few(small_survey, tmp_path, monkeypatch):
@@ -40,7 +43,8 @@ def test_it_is_the_value_of_a_placement_of_the_few(small_survey, tmp_path, monke
     pairs = [np.array([a, b]) for a in few for b in few if a < b and position[a] != position[b]]
     best = max(pairs, key=problem.value)
     answer = finish(early.early_answer(small_survey, objective, tmp_path / "none.npz"))
-    assert answer == returns.describe(best, problem.value(best))
+    assert answer.best == returns.describe(best, problem.value(best))
+    assert set(answer.poses) == set(best.tolist())
 
 
 def test_the_few_have_all_heights_and_types_and_the_required_positions():
@@ -62,25 +66,26 @@ def test_there_is_none_for_a_stored_grid_a_coverage_or_what_the_few_do_not_allow
     objective = Objective(count=2, criterion="road")
     stored = tmp_path / "visibility.npz"
     small_survey.grid.save(stored)
-    assert not finish(early.early_answer(small_survey, objective, stored))
+    assert not finish(early.early_answer(small_survey, objective, stored)).best
     replace(small_survey.grid, key="of other inputs").save(stored)
-    assert finish(early.early_answer(small_survey, objective, stored))
+    assert finish(early.early_answer(small_survey, objective, stored)).best
     cheapest = replace(objective, count=None, coverage=0.5)
-    assert not finish(early.early_answer(small_survey, cheapest, tmp_path / "none.npz"))
+    assert not finish(early.early_answer(small_survey, cheapest, tmp_path / "none.npz")).best
     far_apart = replace(objective, min_distance=1e4)
     monkeypatch.setattr(early, "EARLY_POSES", 1)
     names = small_survey.site.candidates.position_name
     required = replace(far_apart, mandatory=(str(names[0]), str(names[-1])))
-    assert not finish(early.early_answer(small_survey, required, tmp_path / "none.npz"))
+    assert not finish(early.early_answer(small_survey, required, tmp_path / "none.npz")).best
 
 
 def test_it_is_reported_until_the_search_has_a_value():
     def search():
         yield Progress(1, 2, "visibility")
-        yield Progress(0, 0, "improving the placement", best="71% of the road")
+        yield Progress(0, 0, "improving the placement", best="71% of the road", poses=(2, 7))
         yield Progress(0, 3, "fewer and more sensors")
         return "end"
 
     said = []
-    assert finish(early.after_early_answer("65% of the road", search()), lambda one: said.append(one.best)) == "end"
-    assert said == ["65% of the road", "71% of the road", ""]
+    first = Progress(0, 0, "early answer", best="65% of the road", poses=(4,))
+    assert finish(early.after_early_answer(first, search()), lambda one: said.append((one.best, one.poses))) == "end"
+    assert said == [("65% of the road", (4,)), ("71% of the road", (2, 7)), ("", ())]

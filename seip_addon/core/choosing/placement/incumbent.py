@@ -46,7 +46,9 @@ class Incumbent:
         self.instance, self.work = instance, work
         self._describe, self._goal = describe, goal
         self.chosen: Integer = np.zeros(0, dtype=np.int64)
-        self.value, self.bound, self.best = -math.inf, math.inf, ""
+        self.value, self.bound = -math.inf, math.inf
+        self._best = ""
+        self._poses: tuple[int, ...] = ()
 
     @property
     def least_better(self) -> float:
@@ -71,7 +73,8 @@ class Incumbent:
         if value >= self._goal > -math.inf:
             self.work.end()
         if self._describe is not None:
-            self.best = self._describe(self.instance.original[chosen], value * self.instance.unit)
+            poses = self.instance.original[chosen]
+            self._best, self._poses = self._describe(poses, value * self.instance.unit), tuple(poses.tolist())
         return True
 
     @property
@@ -89,7 +92,8 @@ class Incumbent:
 
     def progress(self, phase: str) -> Progress:
         """Return the progress of a phase, with the best placement so far and its gap."""
-        return Progress(0, 0, phase, best=self.best, gap=self.gap if math.isfinite(self.gap) else None)
+        gap = self.gap if math.isfinite(self.gap) else None
+        return Progress(0, 0, phase, best=self._best, poses=self._poses, gap=gap)
 
     def _effort(self, chosen: Integer) -> tuple[int, float]:
         return len(chosen), math.fsum(self.instance.price[chosen])

@@ -7,7 +7,6 @@ import base64
 import binascii
 import zlib
 from dataclasses import dataclass
-from functools import lru_cache
 from itertools import pairwise
 from typing import Any, Literal
 
@@ -174,12 +173,6 @@ def compare(kept: Integer, present: Integer) -> Colouring:
     before, after = kept > 0, present > 0
     classes = np.select([before & after, after, before], [BOTH, PRESENT_ONLY, KEPT_ONLY], NEITHER).astype(np.int64)
     return Colouring(CLASS_WORDS, COMPARED_COLOURS, classes, "Kept and present placement")
-
-
-@lru_cache(maxsize=8)  # a panel asks at every redraw
-def compared_shares(kept: str, present: str) -> tuple[float, ...]:
-    """Return the share of the targets in each class of `compare`, from two texts of `packed_counts`."""
-    return tuple(compare(unpacked_counts(kept), unpacked_counts(present)).shares.tolist())
 
 
 def packed_counts(seen_by: Integer) -> str:

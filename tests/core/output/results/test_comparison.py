@@ -9,8 +9,9 @@ from seip_addon.core.output.pictures.colours import (
     KEPT_ONLY,
     NEITHER,
     PRESENT_ONLY,
-    compared_shares,
+    compare,
     packed_counts,
+    unpacked_counts,
 )
 
 
@@ -18,7 +19,7 @@ from seip_addon.core.output.pictures.colours import (
 def test_shares_are_those_of_sets_of_targets(pairs):
     kept, present = ({i for i, pair in enumerate(pairs) if pair[side]} for side in (0, 1))
     packed = [packed_counts(np.array([pair[side] for pair in pairs], dtype=np.int64)) for side in (0, 1)]
-    shares = compared_shares(*packed)
+    shares = compare(*map(unpacked_counts, packed)).shares
     for number, targets in ((BOTH, kept & present), (KEPT_ONLY, kept - present), (PRESENT_ONLY, present - kept)):
         assert shares[number] == len(targets) / len(pairs)
     assert shares[NEITHER] == (len(pairs) - len(kept | present)) / len(pairs)
