@@ -6,6 +6,16 @@ import bpy
 
 from ..operators.site import EXTRACTS
 
+STEPS: tuple[tuple[str, ...], ...] = (
+    ("load_example", "download_map", "choose_map", "build_site", "check_site"),
+    ("add_catalogue", "preview_beams", "solve_placement"),
+    ("evaluate_sensors", "export_result"),
+    ("colour_coverage", "save_picture"),
+    ("load_traffic", "simulate_traffic", "scan_frame", "write_dataset", "detect"),
+    ("stop",),
+)
+"""Operators of the menu, by step of the work."""
+
 
 class SEIP_FH_map(bpy.types.FileHandler):
     """A map or an extract that is dropped into a 3D view; Blender matches only the last suffix of a name."""
@@ -33,17 +43,6 @@ class SEIP_MT_main(bpy.types.Menu):
             for operator in step:
                 layout.operator(f"seip.{operator}")
             layout.separator()
-
-
-STEPS: tuple[tuple[str, ...], ...] = (
-    ("load_example", "download_map", "choose_map", "build_site", "check_site"),
-    ("add_catalogue", "preview_beams", "solve_placement"),
-    ("evaluate_sensors", "export_result"),
-    ("colour_coverage", "save_picture"),
-    ("load_traffic", "simulate_traffic", "scan_frame", "write_dataset", "detect"),
-    ("stop",),
-)
-"""Operators of the menu, by step of the work."""
 
 
 def draw_import(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:

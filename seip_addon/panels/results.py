@@ -22,6 +22,9 @@ from .sections import Status, draw_sections
 from .sidebar import RowList, draw_reason, draw_run
 from .wrapped_text import draw_sentence
 
+SENSOR_SHARE = 0.72
+"""Share of a row of the list that a sensor takes, beside what it sees."""
+
 
 def draw_view(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     """Draw what can be shown."""
@@ -71,10 +74,6 @@ def _draw_cloud(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     column.label(text="Point Cloud")
     column.row(align=True).prop(context.scene.seip.view, "cloud_colour", expand=True)
     column.operator("seip.hide_overlay", icon="X").name = last_scan.NAME
-
-
-SENSOR_SHARE = 0.72
-"""Share of a row of the list that a sensor takes, beside what it sees."""
 
 
 class SEIP_UL_chosen(RowList, bpy.types.UIList):

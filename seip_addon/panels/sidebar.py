@@ -14,6 +14,11 @@ from ..session import session
 from ..viewport.overlays import TAB
 from .wrapped_text import MARGIN, draw_sentence, sidebar_width, text_width
 
+FIELD = 34.0
+"""Width that the margins of a field and its button for files take, pixels at the interface's usual scale."""
+NARROW = 250
+"""Pixels at the interface's usual scale."""
+
 
 def draw_run(
     layout: bpy.types.UILayout,
@@ -43,12 +48,6 @@ def draw_run(
         return
     line = progress_line(progress)
     draw_sentence(layout, f"{line[:1].upper()}{line[1:]}")
-
-
-FIELD = 34.0
-"""Width that the margins of a field and its button for files take, pixels at the interface's usual scale."""
-NARROW = 250
-"""Pixels at the interface's usual scale."""
 
 
 class Sidebar:

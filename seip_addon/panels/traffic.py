@@ -23,6 +23,20 @@ from .wrapped_text import BOX, draw_sentence
 
 USED = "Detection and placements in traffic use these runs."
 OTHER_SETTINGS = "The settings have changed since: simulate again."
+NAMES = {
+    MAIN_RULE: "AP of all",
+    "car_van_0.7": "Cars, vans",
+    "truck_bus_0.7": "Trucks, buses",
+    "motorcycle_bicycle_0.5": "Two-wheelers",
+    "pedestrian_0.5": "Pedestrians",
+}
+"""Of road users, by the rule that average precision is taken by."""
+MEANING = (
+    "AP, average precision, is 100% where every road user is found and nothing else is reported. A road user is found "
+    "where its box and the detected one, seen from above, share 70% of the area that they cover together (50% for "
+    "two-wheelers and pedestrians). In brackets the 95% interval over other traffic."
+)
+OTHER_SENSORS = "The sensors have changed since: detect again."
 
 
 def _simulation_status(scene: bpy.types.Scene) -> Status:
@@ -48,22 +62,6 @@ def draw_simulation(layout: bpy.types.UILayout, context: bpy.types.Context) -> N
     draw_sentence(layout, f"{simulation.facts}. {USED}")
     if _simulation_status(scene).changed:
         draw_sentence(layout, OTHER_SETTINGS, icon="ERROR")
-
-
-NAMES = {
-    MAIN_RULE: "AP of all",
-    "car_van_0.7": "Cars, vans",
-    "truck_bus_0.7": "Trucks, buses",
-    "motorcycle_bicycle_0.5": "Two-wheelers",
-    "pedestrian_0.5": "Pedestrians",
-}
-"""Of road users, by the rule that average precision is taken by."""
-MEANING = (
-    "AP, average precision, is 100% where every road user is found and nothing else is reported. A road user is found "
-    "where its box and the detected one, seen from above, share 70% of the area that they cover together (50% for "
-    "two-wheelers and pedestrians). In brackets the 95% interval over other traffic."
-)
-OTHER_SENSORS = "The sensors have changed since: detect again."
 
 
 def _detection_status(scene: bpy.types.Scene) -> Status:

@@ -21,15 +21,14 @@ from .conversion import absolute, as_typed, complaint, of_setting, path_property
 
 _FILE = {"subtype": "FILE_PATH", "options": {"PATH_SUPPORTS_BLEND_RELATIVE"}}
 _CODE = {"min": 0, "max": 999_999}
+ROLE_ITEMS = tuple((role.name, role.value.capitalize(), f"{roles.WORDS[role].capitalize()}") for role in roles.ROLES)
+_POLE_RULES = ("", contract.MANDATORY, contract.FORBIDDEN)
 
 
 class SEIP_PG_junction(bpy.types.PropertyGroup):
     """A junction of the chosen file, named as in the list."""
 
     id: StringProperty(name="Id", description="Junction id in the map, or latitude and longitude")
-
-
-ROLE_ITEMS = tuple((role.name, role.value.capitalize(), f"{roles.WORDS[role].capitalize()}") for role in roles.ROLES)
 
 
 class SEIP_PG_site(bpy.types.PropertyGroup):
@@ -133,9 +132,6 @@ def _region_weight(obj: bpy.types.Object) -> float:
 
 def _set_region_weight(obj: bpy.types.Object, value: float) -> None:
     obj[contract.WEIGHT] = as_typed(value)
-
-
-_POLE_RULES = ("", contract.MANDATORY, contract.FORBIDDEN)
 
 
 def _pole_rule(obj: bpy.types.Object) -> int:
