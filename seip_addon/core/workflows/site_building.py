@@ -19,7 +19,6 @@ from ..storage.files import whole_file
 from ..world.elevation.at_place import MapSurroundings, TerrainRequest, with_terrain
 from ..world.elevation.obstacles import Merging
 from ..world.opendrive.junctions import STREETS
-from ..world.opendrive.lanes import lane_surfaces
 from ..world.opendrive.read import read_map
 from ..world.opendrive.road_map import RoadMap
 from ..world.openstreetmap.network_map import credited
@@ -153,12 +152,11 @@ def build_site(
     if is_extract(source):
         return (yield from _of_extract(source, request, map_path))
     map_path, road_map, description = _of_map(source, request)
+    streets = yield from opendrive_streets(road_map)
     notes: tuple[str, ...] = ()
     if request.osm is not None:
-        lanes = [lane for road in road_map.roads for lane in lane_surfaces(road)]
-        middle, reach = _where(StreetMap(road_map, tuple(lanes)), description)
-        description, notes = yield from surroundings_of_map(request.osm, road_map, description, middle, reach)
-    streets = yield from opendrive_streets(road_map)
+        where = _where(streets, description)
+        description, notes = yield from surroundings_of_map(request.osm, streets, description, *where)
     description, more, merging = yield from _with_terrain(streets, description, request)
     model = yield from street_model(streets, description)
     return BuiltSite(map_path.name, replace(model, notes=(*notes, *more, *model.notes)), None, merging, map_path)
@@ -233,9 +231,9 @@ def _of_extract(source: Path, request: SiteRequest, map_path: Path | None) -> Ge
     except UnclearLevelError as error:
         if map_path is None:
             raise
-        _write_map(credited(site.text, site.description.attribution), map_path)
+        _write_map(credited(site.network.text, site.description.attribution), map_path)
         raise UnclearLevelError(f"{error}; {map_path} is written: the map of the streets there") from error
-    map_text = credited(site.text, model.attribution)
+    map_text = credited(site.network.text, model.attribution)
     return BuiltSite(source.name, replace(model, notes=(*site.notes, *more, *model.notes)), map_text, merging)
 
 

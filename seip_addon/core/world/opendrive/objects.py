@@ -1,6 +1,6 @@
 """Objects and signals of a map in map coordinates; `tests/core/world/opendrive/test_opendrive_objects.py` has some."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from shapely import MultiPoint
@@ -65,6 +65,11 @@ class PlacedObject:
     height: float
     radius: float
     outlines: tuple[Outline, ...]
+
+    def moved(self, by: Float) -> "PlacedObject":
+        """Return the object moved by a vector (3,), metres."""
+        outlines = tuple(replace(outline, base=outline.base + by) for outline in self.outlines)
+        return replace(self, position=self.position + by, outlines=outlines)
 
 
 @dataclass(frozen=True, eq=False)

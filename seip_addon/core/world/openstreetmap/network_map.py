@@ -81,8 +81,8 @@ class NetworkMap:
     text: str
     pieces: Mapping[str, tuple[str, float, float]]
 
-    def raised_text(self, profiles: Profiles) -> str:
-        """Return the file with new heights of the roads."""
+    def raised(self, profiles: Profiles) -> "NetworkMap":
+        """Return the network with new heights of the roads in its file."""
 
         def raised(match: re.Match[str]) -> str:
             number, low, high = self.pieces.get(match[2], ("", 0.0, 1.0))
@@ -99,7 +99,7 @@ class NetworkMap:
             z = np.interp((low + (high - low) * shares) * along[-1], along, heights)
             return f'{match[1]}{match[2]}{match[3]}{_shape(np.column_stack([x, y, z]))}"'
 
-        return _LANE.sub(raised, self.text)
+        return replace(self, text=_LANE.sub(raised, self.text))
 
     def walking_on(self, sidewalks: BaseGeometry) -> "NetworkMap":
         """Return the network with its pavements moved to mapped sidewalks along them, given as lines.

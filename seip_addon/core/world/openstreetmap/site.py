@@ -17,7 +17,7 @@ from ...geometry.plan import united
 from ...progress import Progress
 from ...site.scene_geometry import FROM_EXTRACT
 from ..opendrive.junctions import STREETS, nearest_junctions, streets_of_junctions
-from ..opendrive.lanes import LaneSurface, lane_surfaces
+from ..opendrive.lanes import LaneSurface
 from ..opendrive.road_map import Junction, RoadMap
 from ..streetscape import road_surface
 from ..streetscape.description import DEFAULT_RADIUS, SiteDescription
@@ -26,7 +26,7 @@ from ..streetscape.levels import UNNAMED_ROAD
 from ..streetscape.named_places import street_names
 from ..streetscape.place import SCENE_MARGIN
 from ..streetscape.street_map import StreetMap
-from ..streetscape.terrain import FlatLand
+from ..streetscape.terrain import level_land
 from .assumptions import MAX_NAMED, assumed_crossings, assumed_lanes, implausible_lane_notes, lane_notes, lone_signals
 from .extract import EARTH_RADIUS, MAX_LATITUDE, Extract, Way, cropped, read_extract, window
 from .heights import StreetHeights, street_heights
@@ -101,9 +101,7 @@ class ExtractSite:
     streets : StreetMap
         Streets as netconvert lays them out, with the crossings of the extract: flat, unless the extract has heights.
     network : NetworkMap
-        Network of these streets.
-    text : str
-        Text of the network, on which traffic is simulated.
+        Network of these streets, on which traffic is simulated.
     description : SiteDescription
         Objects next to the streets, and the extent of the region.
     notes : tuple of str
@@ -118,7 +116,6 @@ class ExtractSite:
 
     streets: StreetMap
     network: NetworkMap
-    text: str
     description: SiteDescription
     notes: tuple[str, ...]
     source: StreetFile
@@ -131,17 +128,14 @@ class ExtractSite:
         ground = None if relief is None else relief.rise
         heights = street_heights(road_map, self.source, self.shapes, ground)
         raised = replace(self, notes=(*self.notes, *heights.notes, *self._ramp_notes(heights)))
-        is_raised = any(along_road.any() for _, along_road in heights.profiles.values())
-        if is_raised:
-            streets = self.streets.raised(heights.above_ground)
-            raised = replace(raised, streets=streets, text=self.network.raised_text(heights.profiles))
-        if relief is not None:
-            relief = replace(relief, bridges=heights.bridges)
-            return replace(raised, description=replace(self.description, relief=relief))
-        if is_raised and not self.source.elevated:
-            land = FlatLand(0.0, heights.bridges)
-            return replace(raised, description=replace(self.description, flat_land=land))
-        return raised
+        if any(along_road.any() for _, along_road in heights.profiles.values()):
+            streets, network = self.streets.raised(heights.above_ground), self.network.raised(heights.profiles)
+            raised = replace(raised, streets=streets, network=network)
+            relief = level_land(0.0) if relief is None and not self.source.elevated else relief
+        if relief is None:
+            return raised
+        relief = replace(relief, bridges=heights.bridges)
+        return replace(raised, description=replace(self.description, relief=relief))
 
     def _ramp_notes(self, heights: StreetHeights) -> Iterator[str]:
         """Yield a note on the assumed heights of bridges, underpasses and their ramps in the area."""
@@ -225,8 +219,7 @@ def site_of_extract(
         *lone_signals([node for node in lone if extent.seen.intersects(shapely.Point(shapes.point(node)))]),
     )
     sidewalks = shapely.MultiLineString([way.line for way in description.ways if way.line is not None])
-    network = network.walking_on(sidewalks)
-    return ExtractSite(streets, network, network.text, description, notes, source, shapes, extent.seen)
+    return ExtractSite(streets, network.walking_on(sidewalks), description, notes, source, shapes, extent.seen)
 
 
 def _extract_around(
@@ -371,7 +364,7 @@ def _check(path: Path, place: ExtractPlace) -> None:
 
 
 def surroundings_of_map(
-    path: Path, road_map: RoadMap, description: SiteDescription, middle: Float, reach: float
+    path: Path, streets: StreetMap, description: SiteDescription, middle: Float, reach: float
 ) -> Generator[Progress, None, tuple[SiteDescription, tuple[str, ...]]]:
     """Add the surroundings of a place on a map, read from an extract, to a description.
 
@@ -379,7 +372,7 @@ def surroundings_of_map(
     ----------
     path : Path
         Extract.
-    road_map : RoadMap
+    streets : StreetMap
         Map that the place is on.
     description : SiteDescription
         Description to add to.
@@ -394,8 +387,7 @@ def surroundings_of_map(
         The extract cannot be read or has no objects at the place, or the map has no known projection.
     """
     extract = yield from read_extract(path)
-    shapes = PlanShapes(extract, _projection(road_map), road_map.header_offset[:2])
-    streets = StreetMap(road_map, tuple(lane for road in road_map.roads for lane in lane_surfaces(road)))
+    shapes = PlanShapes(extract, _projection(streets.road_map), streets.road_map.header_offset[:2])
     area = shapely.Point(middle).buffer(reach + SCENE_MARGIN + STANDS_AROUND, quad_segs=16)
     found = surroundings(shapes, area, _carriageway(streets, middle, reach))
     if not found.has_objects:

@@ -40,9 +40,9 @@ def clear(
     description : SiteDescription
         Description to clear.
     carriageway : shapely geometry
-        Carriageway on the studied level, map coordinates.
+        Carriageway on the studied level, in the axes of the description.
     mouths : shapely geometry
-        Lines across it where the road continues, map coordinates.
+        Lines across it where the road continues.
     """
     shapely.prepare(carriageway)
     lanes = carriageway.buffer(-MAX_IN_LANE)

@@ -41,7 +41,6 @@ from .map_furniture import (
     CROWN_SHARE,
     is_trunk,
     landings,
-    local_objects,
     object_parts,
 )
 from .named_places import area_in_plan, named_places, street_names
@@ -151,10 +150,11 @@ def street_model(streets: StreetMap, description: SiteDescription) -> Generator[
     region = place.region()
     origin = _origin(place, description.relief)
     yield _step("ground")
-    street = site_ground(streets, levels, origin, shifted(region, -origin), description)
-    yield _step("objects")
     # From here on in local axes: objects of the description and of the map.
-    described, clear_notes = _local_description(description, street)
+    described = _local_description(description, origin)
+    street = site_ground(streets, levels, origin, shifted(region, -origin), described)
+    yield _step("objects")
+    described, clear_notes = clear(described, street.roadside.carriageway, street.roadside.mouths)
     objects, covered_notes = _without_covered(_map_objects(streets, street), described)
     furniture = _furniture(objects, _map_signals(streets, street, levels), described, street)
     other_levels = other_level_parts(street)
@@ -210,18 +210,12 @@ def _step(name: str) -> Progress:
     return Progress(STEPS.index(name), len(STEPS), "streets", counted=False)
 
 
-def _local_description(description: SiteDescription, street: SiteGround) -> tuple[SiteDescription, tuple[str, ...]]:
-    """Return a description with the carriageway cleared and its objects and areas in local axes, and notes.
-
-    The choice of the place (``near``, ``region``, weighted regions) and the ground remain in map coordinates: `Place`
-    and `SiteGround` have used them before.
-    """
-    on_map = (shifted(area, street.origin) for area in (street.roadside.carriageway, street.roadside.mouths))
-    cleared, notes = clear(description, *on_map)
+def _local_description(description: SiteDescription, origin: Float) -> SiteDescription:
+    """Return a description with objects and areas in local axes; the place and the ground stay as they are."""
     local: dict[str, Any] = {
-        name: tuple(_local(one, street.origin) for one in getattr(cleared, name)) for name in PLACED_FIELDS
+        name: tuple(_local(one, origin) for one in getattr(description, name)) for name in PLACED_FIELDS
     }
-    return replace(cleared, **local), notes
+    return replace(description, **local)
 
 
 def _local(item: _Item, origin: Float) -> _Item:
@@ -240,8 +234,9 @@ def _local(item: _Item, origin: Float) -> _Item:
 def _map_objects(streets: StreetMap, street: SiteGround) -> tuple[PlacedObject, ...]:
     """Return the objects of the map within the extent, on the ground, in local axes."""
     area = shifted(street.extent, street.origin)
-    on_map = (_risen(one, street.relief) for one in streets.objects if extent_in_plan(one).intersects(area))
-    return local_objects(on_map, street.origin)
+    near = (one for one in streets.objects if extent_in_plan(one).intersects(area))
+    # An object is raised as a whole by the ground under its position.
+    return tuple(one.moved(on_relief(one.position, street.relief) - one.position - street.origin) for one in near)
 
 
 def _map_signals(streets: StreetMap, street: SiteGround, levels: Levels) -> list[PlacedSignal]:
@@ -378,16 +373,6 @@ def _origin(place: Place, relief: Relief | None) -> Float:
     points = np.concatenate([np.concatenate([lane.left, lane.right]) for lane in place.surfaces])
     nearest = points[np.argmin(np.hypot(*(points[:, :2] - place.centre).T))]
     return np.round([*place.centre, on_relief(nearest, relief)[2]])
-
-
-def _risen(placed: PlacedObject, relief: Relief | None) -> PlacedObject:
-    """Return an object of a map, raised as a whole by the ground under its position."""
-    if relief is None:
-        return placed
-    position = on_relief(placed.position, relief)
-    rise = position - placed.position
-    outlines = tuple(replace(one, base=one.base + rise) for one in placed.outlines)
-    return replace(placed, position=position, outlines=outlines)
 
 
 def _weighted_parts(

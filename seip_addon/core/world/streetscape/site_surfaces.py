@@ -128,7 +128,7 @@ def _pavements(street: SiteGround, triangles: Float) -> tuple[list[Part], tuple[
         return [verge], ("the map has no pavements: new posts may stand on a strip of verge",)
     plan = shapely.polygons(triangles[:, :, :2])
     near = shapely.distance(street.region, plan) <= CANDIDATE_MARGIN
-    kerbs = road_surface.kerb_faces(triangles, None if street.land is None else KERB_STEP)
+    kerbs = road_surface.kerb_faces(triangles, None if street.relief is None else KERB_STEP)
     parts = [
         Part("Pavements", from_faces(triangles[near], "pavement"), (Role.GROUND, Role.CANDIDATE_AREAS)),
         Part("Pavements beyond", from_faces(triangles[~near], "pavement"), (Role.GROUND,)),
@@ -180,7 +180,7 @@ def verge_part(street: SiteGround, furniture: Sequence[Part], surfaces: Sequence
     lanes = lanes if others.is_empty else lanes.union(others)
     lanes = without(lanes, street.crossing.decks.buffer(road_surface.MAX_SEAM, join_style="mitre"))
     open_ground = road_surface.without_crumbs(without(ground, lanes))
-    spacing = VERGE_SPACING if street.relief is None else RELIEF_SPACING
+    spacing = VERGE_SPACING if street.relief is None or street.relief.is_level else RELIEF_SPACING
     triangles = street.ground.drape(open_ground, spacing=spacing, above=-VERGE_BELOW)
     return Part("Verge", from_faces(triangles, "verge"), (Role.GROUND,))
 
