@@ -44,31 +44,19 @@ DOWNLOAD_MARGIN = 200.0  # metres beyond the streets that are laid out: `site_of
 
 
 @dataclass(frozen=True)
-class SiteRequest:
-    """Options of building a site, in addition to the file that it is built from.
+class SiteRequest(ExtractPlace):
+    """Options of building a site, in addition to the file that it is built from and to the place in an extract.
 
     Parameters
     ----------
     near : (x, y) or None
         Centre of the site: map coordinates in metres.
-    near_latlon : (latitude, longitude) or None, degrees
-        Centre of the site as latitude and longitude.
-    junction : tuple of str
-        Id or name of the junction at the centre, or the names of two streets that meet there.
-    radius, approaches : float or None, metres
-        Extent of the site, as in a `SiteDescription`.
-    level : tuple of str
-        Roads of the level, as in a `SiteDescription`.
     site : Path or None
         Site description for a map.
     osm : Path or None
         Extract whose buildings, trees and posts are added to an OpenDRIVE map.
     terrain : TerrainRequest or None
         Elevation model or laser survey that gives the ground its heights.
-    service : bool
-        Whether driveways and aisles of an extract are streets.
-    left_hand : bool or None
-        Whether traffic of an extract keeps left; None to take it from the extract.
     anywhere : bool
         Whether to use the centre of a map if no position is given.
     sumo : tuple of Path
@@ -78,34 +66,14 @@ class SiteRequest:
     """
 
     near: tuple[float, float] | None = None
-    near_latlon: tuple[float, float] | None = None
-    junction: tuple[str, ...] = ()
-    radius: float | None = None
-    approaches: float | None = None
-    level: tuple[str, ...] = ()
     site: Path | None = None
     osm: Path | None = setting(
         None, "OpenStreetMap extract with buildings, trees and posts for a map", metavar="EXTRACT"
     )
     terrain: TerrainRequest | None = None
-    service: bool = False
-    left_hand: bool | None = None
     anywhere: bool = False
     sumo: tuple[Path, ...] = ()
     overpass: OverpassServer | None = None
-
-    @property
-    def extract_place(self) -> ExtractPlace:
-        """The place that is studied, in an extract."""
-        return ExtractPlace(
-            near=self.near_latlon,
-            streets=self.junction,
-            radius=self.radius,
-            approaches=self.approaches,
-            service=self.service,
-            left_hand=self.left_hand,
-            level=self.level,
-        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,7 +149,7 @@ def site_source(request: SiteRequest, source: Path | None = None) -> Generator[P
         if source is None:
             raise SeipError("no map is named: give a map or an extract, or --at LAT,LON to download one")
         return source
-    reach = max(request.extract_place.reach, 0.0) + STREET_REACH + DOWNLOAD_MARGIN
+    reach = max(request.reach, 0.0) + STREET_REACH + DOWNLOAD_MARGIN
     if source is not None and not is_outgrown(source, near, reach):
         return source
     return (yield from download_extract(near, reach, request.overpass))
@@ -207,11 +175,9 @@ def _write_map(text: str, path: Path) -> None:
 def _of_extract(source: Path, request: SiteRequest, map_path: Path | None) -> Generator[Progress, None, BuiltSite]:
     if request.near is not None or request.osm is not None:
         raise SeipError(f"{source.name} is an extract of OpenStreetMap: give its position by --near-latlon LAT LON")
-    if len(request.junction) == 1:
-        raise SeipError(f'a junction of {source.name} needs two streets: give --junction "One Street" "Other Street"')
     with tempfile.TemporaryDirectory() as folder:
         network = Path(folder) / "streets.net.xml"
-        site = yield from site_of_extract(source, request.extract_place, network, request.sumo)
+        site = yield from site_of_extract(source, request, network, request.sumo)
     found = site.description
     _, described = describe_place(source, site=request.site)
     description = replace(

@@ -83,7 +83,7 @@ def _apart(places: list[tuple[float, float]]) -> Iterator[tuple[float, float]]:
     """Yield the centres of groups of places that lie close to each other."""
     waiting = np.array(sorted(places))
     while len(waiting):
-        near = np.hypot(*metres(waiting, waiting[0]).T) <= ONE_CROSSING
+        near = np.hypot(*plan_metres(waiting, waiting[0]).T) <= ONE_CROSSING
         latitude, longitude = waiting[near].mean(axis=0).tolist()
         yield latitude, longitude
         waiting = waiting[~near]
@@ -117,7 +117,7 @@ def selected_junctions(
         if within is None or within.intersects(shapely.Point(one.longitude, one.latitude))
     ]
     if found:
-        places = metres([(one.latitude, one.longitude) for one in found], (found[0].latitude, found[0].longitude))
+        places = plan_metres([(one.latitude, one.longitude) for one in found], (found[0].latitude, found[0].longitude))
         selected = np.zeros(len(found), dtype=bool)
         for rule in rules:
             selected |= _selected(extract, rule, places, (found[0].latitude, found[0].longitude))
@@ -129,11 +129,6 @@ def selected_junctions(
             "road class), another area, or another extract"
         )
     return tuple(found)
-
-
-def metres(latlon: Sequence[tuple[float, float]] | Float, origin: tuple[float, float] | Float) -> Float:
-    """Return east and north, (n, 2) float64 metres, of latitudes and longitudes near an origin."""
-    return plan_metres(np.array(latlon, dtype=np.float64).reshape(-1, 2), np.array(origin))
 
 
 def _selected(extract: Extract, rule: str, places: Float, origin: tuple[float, float]) -> Boolean:
@@ -149,7 +144,7 @@ def _selected(extract: Extract, rule: str, places: Float, origin: tuple[float, f
         reach = ROUNDABOUT_REACH if rule == "roundabouts" else SAME_JUNCTION / 2
     if not nodes:
         return np.zeros(len(places), dtype=bool)
-    points = shapely.points(metres([(node.latitude, node.longitude) for node in nodes], origin))
+    points = shapely.points(plan_metres([(node.latitude, node.longitude) for node in nodes], origin))
     near = shapely.STRtree(points).query(shapely.points(places), "dwithin", distance=reach)[0]
     selected: Boolean = np.isin(np.arange(len(places)), near)
     return selected
@@ -169,7 +164,7 @@ def _merged(found: Sequence[Crossing]) -> list[Crossing]:
     kept: list[Crossing] = []
     for one in order:
         here = (one.latitude, one.longitude)
-        others = metres([(other.latitude, other.longitude) for other in kept], here)
+        others = plan_metres([(other.latitude, other.longitude) for other in kept], here)
         if not len(others) or np.hypot(*others.T).min() > SAME_JUNCTION:
             kept.append(one)
     return sorted(kept, key=lambda one: (one.streets, one.latitude, one.longitude))

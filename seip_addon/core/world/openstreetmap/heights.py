@@ -30,7 +30,7 @@ from ...arrays import Float, Integer
 from ...geometry.plan import beside, travelled
 from ..opendrive.road_map import Road, RoadMap
 from ..streetscape.street_map import Profiles
-from .bridges import Crossing, corridors, half_width, lanes_of
+from .bridges import Crossing, corridors, half_width
 from .plan_shapes import PlanShapes
 from .streets import StreetFile, is_link, joined, way_id
 
@@ -159,8 +159,7 @@ class _Graph:
 
     def half(self, way: int) -> float:
         """Return half the width of a way, metres."""
-        tags = self.streets.ways[way].tags
-        return half_width(tags, lanes_of(tags))
+        return half_width(self.streets.ways[way].tags)
 
     def cells(self, way: int) -> NDArray[np.object_]:
         """Return the area in plan around each place of a way."""
@@ -194,12 +193,10 @@ class _Graph:
         if not pieces:
             return np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64), np.empty(0)
         first, last = np.concatenate(pieces).T
-        start, step = self.xy[first], self.xy[last] - self.xy[first]
-        share = ((places[:, None] - start) * step).sum(axis=2) / np.maximum((step**2).sum(axis=1), _TOLERANCE)
-        share = np.clip(share, 0.0, 1.0)
-        away = np.linalg.norm(places[:, None] - start - share[:, :, None] * step, axis=2)
-        nearest = np.argmin(away, axis=1)
-        return first[nearest], last[nearest], share[np.arange(len(places)), nearest]
+        segments = shapely.linestrings(np.stack([self.xy[first], self.xy[last]], axis=1))
+        points = shapely.points(places)
+        nearest = shapely.STRtree(segments).nearest(points)
+        return first[nearest], last[nearest], shapely.line_locate_point(segments[nearest], points, normalized=True)
 
     def limit_turns(self, road_map: RoadMap) -> None:
         """Limit the grades of the roads within junctions, which may be shorter than the ways between their ends."""

@@ -54,10 +54,10 @@ class ExtractPlace:
 
     Parameters
     ----------
-    near : (latitude, longitude) or None, degrees
+    near_latlon : (latitude, longitude) or None, degrees
         Position of the place.
-    streets : tuple of str
-        Names of two or more streets that meet there, instead of ``near``.
+    junction : tuple of str
+        Names of two or more streets that meet there, instead of the position; in a map, id or name of the junction.
     radius, approaches : float or None, metres
         See `SiteDescription`; without either the region follows the approaches of the junction.
     service : bool
@@ -68,8 +68,8 @@ class ExtractPlace:
         Names of streets on the level to study.
     """
 
-    near: tuple[float, float] | None = None
-    streets: tuple[str, ...] = ()
+    near_latlon: tuple[float, float] | None = None
+    junction: tuple[str, ...] = ()
     radius: float | None = None
     approaches: float | None = None
     service: bool = False
@@ -229,8 +229,8 @@ def _extract_around(
     # Streets are laid out well beyond the region, for traffic; 200 m more hold the junction that was named, whose
     # centre may lie away from the place.
     most = place.reach + STREET_REACH + 200.0
-    extract = yield from read_extract(path, None if place.near is None else window(*place.near, most))
-    near, notes = (place.near, ()) if place.near else meeting_place(extract, place.streets)
+    extract = yield from read_extract(path, None if place.near_latlon is None else window(*place.near_latlon, most))
+    near, notes = (place.near_latlon, ()) if place.near_latlon else meeting_place(extract, place.junction)
     return cropped(extract, window(*near, most)), near, notes
 
 
@@ -327,7 +327,7 @@ def _extent(
 
 def _name(extract: Extract, streets: StreetMap, source: StreetFile, place: ExtractPlace, extent: _Extent) -> str:
     """Return the title of a place: the streets that were asked for, or those that meet there."""
-    names = [spelt(extract, name) for name in place.streets] or _title(streets, source, place, extent)
+    names = [spelt(extract, name) for name in place.junction] or _title(streets, source, place, extent)
     if names:
         return STREETS.join(names)
     latitude, longitude = extent.near
@@ -349,17 +349,20 @@ def _assumed_widths(ways: Iterable[Way]) -> frozenset[str]:
 
 def _check(path: Path, place: ExtractPlace) -> None:
     """Raise an error if a place is not given, or not validly."""
-    if place.near is None and not place.streets:
-        raise SeipError(f'{path.name} needs a place: --near-latlon LAT LON, or --junction "One Street" "Other Street"')
     for name, length in (("radius", place.radius), ("approaches", place.approaches)):
         if length is not None and not 0.0 < length < math.inf:
             raise SeipError(f"--{name} {length:g} is not a valid length: give metres above zero")
-    if place.near is not None and not (abs(place.near[0]) <= MAX_LATITUDE and abs(place.near[1]) <= 180.0):
-        raise SeipError(
-            f"--near-latlon {place.near[0]:g} {place.near[1]:g} is not a valid place: give degrees, the latitude "
-            f"first, up to {MAX_LATITUDE:g}, then the longitude, up to 180"
-        )
-    if place.near is None and len({name.strip().casefold() for name in place.streets} - {""}) < len(place.streets):
+    names = {name.strip().casefold() for name in place.junction} - {""}
+    if place.near_latlon is not None:
+        latitude, longitude = place.near_latlon
+        if not (abs(latitude) <= MAX_LATITUDE and abs(longitude) <= 180.0):
+            raise SeipError(
+                f"--near-latlon {latitude:g} {longitude:g} is not a valid place: give degrees, the latitude first, up "
+                f"to {MAX_LATITUDE:g}, then the longitude, up to 180"
+            )
+    elif not names:
+        raise SeipError(f'{path.name} needs a place: --near-latlon LAT LON, or --junction "One Street" "Other Street"')
+    if place.junction and len(names) < max(len(place.junction), 2):
         raise SeipError('--junction takes the names of two different streets: --junction "One Street" "Other Street"')
 
 

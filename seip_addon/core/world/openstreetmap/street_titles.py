@@ -10,10 +10,10 @@ import numpy as np
 import shapely
 
 from ...errors import SeipError
+from ...geometry.tangent_plane import plan_metres
 from ..opendrive.lanes import LaneSurface
 from ..opendrive.road_map import RoadMap
 from ..streetscape.intersections import SAME_DIRECTION, TOUCH
-from .crossings import metres
 from .extract import Extract, Node, Way
 from .streets import CLASSES, is_street, shown_name
 
@@ -109,7 +109,7 @@ def meeting_place(extract: Extract, names: tuple[str, ...]) -> tuple[tuple[float
 
 def _away(node: Node, others: Sequence[Node]) -> float:
     """Return the distance from a node to the nearest of others, metres."""
-    places = metres([(other.latitude, other.longitude) for other in others], (node.latitude, node.longitude))
+    places = plan_metres([(other.latitude, other.longitude) for other in others], (node.latitude, node.longitude))
     return float(np.hypot(*places.T).min())
 
 

@@ -15,7 +15,6 @@ import numpy as np
 import shapely
 
 from ...arrays import Float
-from ...geometry.tangent_plane import plan_metres
 from .bridges import Structures, structures
 from .extract import Extract, Node, Tags, Way, reversed_tags
 from .handedness import drives_on_the_left
@@ -156,7 +155,7 @@ def write_streets(
     # netconvert guesses lanes, widths, pavements and signals by its own defaults. The streets are therefore written
     # with these made explicit, and with signals moved to the junctions that they control.
     medians = _Medians(extract, [way for _, way in pieces])
-    places = dict(zip(extract.nodes, _in_metres(extract, list(extract.nodes.values())), strict=True))
+    places = dict(zip(extract.nodes, extract.in_metres(extract.nodes.values()), strict=True))
     signals = matched_signals(extract, [way for _, way in pieces], places)
     lines = ['<?xml version="1.0" encoding="UTF-8"?>', '<osm version="0.6">']
     for number, height in zip(used, heights, strict=True):
@@ -236,7 +235,7 @@ def _widest(streets: Mapping[int, Way], number: int, onward: Iterable[int]) -> T
 
 def _is_short(extract: Extract, way: Way) -> bool:
     """Return whether a way is no longer than `SHORT_PIECE`; False if the extract lacks one of its nodes."""
-    line = _in_metres(extract, extract.line(way))
+    line = extract.in_metres(extract.line(way))
     return len(line) == len(way.nodes) and float(np.hypot(*np.diff(line, axis=0).T).sum()) <= SHORT_PIECE
 
 
@@ -274,19 +273,12 @@ def _slip_ends(extract: Extract, ways: Sequence[Way]) -> Iterator[int]:
             neighbours.setdefault(one, set()).add(other)
             neighbours.setdefault(other, set()).add(one)
     meeting = [number for number, others in neighbours.items() if len(others) > 2]
-    places = _in_metres(extract, [extract.nodes[number] for number in meeting])
+    places = extract.in_metres([extract.nodes[number] for number in meeting])
     links = {end for way in ways if is_link(way.tags) and is_one_way(way.tags) for end in (way.nodes[0], way.nodes[-1])}
     for number, place in zip(meeting, places, strict=True):
         # The smallest distance is that of the node to itself, 0; the second smallest is to the nearest other junction.
         if number in links and np.sort(np.hypot(*(places - place).T))[1:2].min(initial=math.inf) > JOIN_DISTANCE:
             yield number
-
-
-def _in_metres(extract: Extract, nodes: Sequence[Node]) -> Float:
-    """Return the positions of nodes (n, 2), metres east and north of the extract's first node."""
-    degrees = np.array([(node.latitude, node.longitude) for node in nodes], dtype=np.float64).reshape(-1, 2)
-    first = next(iter(extract.nodes.values()))
-    return plan_metres(degrees, np.array([first.latitude, first.longitude]))
 
 
 def joined(ways: Iterable[tuple[int, ...]]) -> tuple[frozenset[int], ...]:
@@ -482,11 +474,10 @@ class _Medians:
                 starts.append(line[:-1])
                 stops.append(line[1:])
                 names += [way.tags.get("name", "")] * (len(line) - 1)
-        empty = np.empty((0, 2))
-        self._start, self._stop = (np.concatenate([empty, *points]) for points in (starts, stops))
+        start, stop = (np.concatenate([np.empty((0, 2)), *points]) for points in (starts, stops))
+        self._along = (stop - start) / np.maximum(np.hypot(*(stop - start).T), 1e-9)[:, None]
         self._names = np.array(names, dtype=object)
-        lines = shapely.linestrings(np.stack([self._start, self._stop], axis=1))
-        self._tree = shapely.STRtree(list(lines))
+        self._tree = shapely.STRtree(shapely.linestrings(np.stack([start, stop], axis=1)))
 
     def beside(self, way: Way) -> tuple[bool, bool]:
         """Return whether the opposite carriageway of a one-way street lies on its left, and on its right."""
@@ -494,26 +485,24 @@ class _Medians:
         steps = np.diff(line, axis=0)
         if not len(steps):
             return False, False
-        # Cast a ray to each side from the middle of each segment: where carriageways part around a refuge, they are
-        # parallel for a few metres only. It starts at 2 m, so as not to meet the street itself.
-        found = [False, False]
-        for start, step in zip(line, steps, strict=False):
-            middle, along = start + step / 2, step / (np.hypot(*step) or 1.0)
-            aside = np.array([-along[1], along[0]])
-            for side, sign in enumerate((1.0, -1.0)):
-                ray = shapely.linestrings(np.stack([middle + 2.0 * sign * aside, middle + MAX_MEDIAN * sign * aside]))
-                for index in self._tree.query(ray, predicate="intersects"):
-                    # The other carriageway has the same name and leads the opposite way, within 37 degrees (cosine
-                    # below -0.8). A parallel one-way street of the same direction does not make the space between them
-                    # a median.
-                    ahead = self._stop[index] - self._start[index]
-                    opposite = float(ahead @ along) < -0.8 * float(np.hypot(*ahead))
-                    found[side] |= opposite and self._names[index] == way.tags.get("name", "")
-        return found[0], found[1]
+        middle, along = line[:-1] + steps / 2, steps / np.maximum(np.hypot(*steps.T), 1e-9)[:, None]
+        aside = np.column_stack([-along[:, 1], along[:, 0]])
+
+        def opposite(sign: float) -> bool:
+            # Cast a ray to the side from the middle of each segment: where carriageways part around a refuge, they are
+            # parallel for a few metres only. It starts at 2 m, so as not to meet the street itself.
+            rays = shapely.linestrings(np.stack([middle + by * sign * aside for by in (2.0, MAX_MEDIAN)], axis=1))
+            segment, other = self._tree.query(rays, predicate="intersects")
+            # The other carriageway has the same name and leads the opposite way, within 37 degrees (cosine below -0.8).
+            # A parallel one-way street of the same direction does not make the space between them a median.
+            cosine = (self._along[other] * along[segment]).sum(axis=1)
+            return bool(((cosine < -0.8) & (self._names[other] == way.tags.get("name", ""))).any())
+
+        return opposite(1.0), opposite(-1.0)
 
     def _line(self, way: Way) -> Float:
         """Return the line of a way (n, 2), metres from the extract's first node, in driving direction."""
-        return _in_metres(self._extract, self._extract.line(way))
+        return self._extract.in_metres(self._extract.line(way))
 
 
 def is_link(tags: Tags) -> bool:

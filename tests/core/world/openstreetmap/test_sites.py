@@ -183,7 +183,7 @@ def test_a_place_can_be_named_by_its_streets(tmp_path):
         ({"near_latlon": None}, "needs a place"),
         ({"near_latlon": (48.0, 2.0)}, "no node near the place"),
         ({"near_latlon": (52.5, 13.4), "osm": "x"}, "is an extract"),
-        ({"near_latlon": None, "junction": ("East Road",)}, "needs two streets"),
+        ({"near_latlon": None, "junction": ("East Road",)}, "two different streets"),
         (
             {"near_latlon": None, "junction": ("East Road", "Nowhere Lane")},
             "no street called 'Nowhere Lane'; the closest",
