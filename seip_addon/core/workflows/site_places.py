@@ -8,12 +8,10 @@ from ..distinct_names import distinct_names
 from ..progress import Progress
 from ..world.opendrive.junctions import STREETS, streets_of_junctions
 from ..world.opendrive.read import read_map
-from ..world.opendrive.street_plan import street_plan as plan_of_map
 from ..world.openstreetmap.crossings import Crossing, named_crossings
 from ..world.openstreetmap.extract import read_extract
 from ..world.openstreetmap.site import is_extract
-from ..world.openstreetmap.street_plan import street_plan as plan_of_extract
-from ..world.street_plan import StreetPlan
+from ..world.street_plan import StreetPlan, plan_of_extract, plan_of_map
 from ..world.streetscape.description import DEFAULT_RADIUS
 from ..world.streetscape.site_file import describe_place
 from ..world.streetscape.street_map import opendrive_streets

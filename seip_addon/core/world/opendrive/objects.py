@@ -43,8 +43,8 @@ class PlacedObject:
         Type in lower case, such as ``building`` or ``tree``.
     position : (3,) float64, metres
         Origin in map coordinates.
-    yaw, pitch, roll : float, radians
-        Rotations about z, then y, then x; yaw counter-clockwise from +x.
+    yaw : float, radians
+        Rotation about the vertical, counter-clockwise from +x; its outlines also have the file's pitch and roll.
     length, width, height, radius : float, metres
         Size of its box or cylinder, zero if the file does not give it.
     outlines : tuple of Outline
@@ -58,13 +58,11 @@ class PlacedObject:
     kind: str
     position: Float
     yaw: float
-    pitch: float
-    roll: float
-    length: float
-    width: float
-    height: float
-    radius: float
-    outlines: tuple[Outline, ...]
+    length: float = 0.0
+    width: float = 0.0
+    height: float = 0.0
+    radius: float = 0.0
+    outlines: tuple[Outline, ...] = ()
 
     def moved(self, by: Float) -> "PlacedObject":
         """Return the object moved by a vector (3,), metres."""

@@ -103,7 +103,7 @@ def _tunnel(road: Road, node: Node) -> PlacedObject:
     along = np.linspace(start, stop, 2 + int((stop - start) / TUNNEL_STEP))
     line = Outline(road.place(along, np.zeros(len(along))), np.zeros(len(along)), closed=False)
     names = road.id, node.text("id", ""), node.text("name", ""), TUNNEL
-    return PlacedObject(*names, line.base.mean(axis=0), 0.0, 0.0, 0.0, float(stop - start), 0.0, 0.0, 0.0, (line,))
+    return PlacedObject(*names, line.base.mean(axis=0), 0.0, length=float(stop - start), outlines=(line,))
 
 
 def _object(road: Road, node: Node) -> _Object:
@@ -190,8 +190,6 @@ def _placed(item: _Object, copy: _Copy) -> PlacedObject:
         kind=node.text("type", "none").lower(),
         position=position,
         yaw=yaw,
-        pitch=item.pitch,
-        roll=item.roll,
         length=copy.length,
         width=copy.width,
         height=copy.height,

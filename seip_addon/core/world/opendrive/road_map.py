@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -218,6 +219,11 @@ class RoadMap:
     objects: tuple[PlacedObject, ...] = ()
     signals: tuple[PlacedSignal, ...] = ()
     attribution: tuple[str, ...] = ()
+
+    @cached_property
+    def names(self) -> dict[str, str]:
+        """Names of the streets by the ids of their roads, "" for roads without one."""
+        return {road.id: road.name for road in self.roads}
 
     def junctions_with_roads(self) -> tuple[Junction, ...]:
         """Return the junctions that have roads, in the order of the file."""

@@ -418,7 +418,7 @@ def crossing(number: str, name: str, line: Float, depth: float) -> PlacedObject:
     position = np.array([*(first + last) / 2, 0.0])
     width = float(math.hypot(x, y))
     heading = math.atan2(y, x) - math.pi / 2
-    return PlacedObject("", number, name, CROSSING, position, heading, 0.0, 0.0, depth, width, 0.0, 0.0, ())
+    return PlacedObject("", number, name, CROSSING, position, heading, length=depth, width=width)
 
 
 def _signals(network: StreetNetwork) -> Iterator[PlacedSignal]:

@@ -146,8 +146,7 @@ class ExtractSite:
             if not np.abs(above).max() >= MIN_RAMP:
                 continue
             (road,) = (road for road in road_map.roads if road.id == number)
-            places = shapely.points(road.frame(along).origin[:, :2])
-            near = above[shapely.intersects(self.area, places)]
+            near = above[shapely.intersects_xy(self.area, road.frame(along).origin[:, :2])]
             if len(near) and np.abs(near).max() >= MIN_RAMP and road.junction_id is None:
                 most = float(near[np.argmax(np.abs(near))])
                 name = names.get(number, UNNAMED_ROAD)
@@ -244,7 +243,7 @@ def _network(
         extract, streets_path, window(*near, reach), service=place.service, left_hand=place.left_hand
     )
     try:
-        if source.streets == 0:
+        if not source.ways:
             raise _no_street(extract, near, reach)
         yield from convert(source, streets_path, map_path, sumo)
     finally:
@@ -468,7 +467,7 @@ def _title(streets: StreetMap, source: StreetFile, place: ExtractPlace, extent: 
             return crossing_pair(ranked, headings_at(road_map, lanes, extent.together))
     if level:
         return level[:2]
-    called = {road.id: road.name for road in road_map.roads}
+    called = road_map.names
     driving = [lane for lane in road_surface.in_groups(lanes, ["driving"]) if called[lane.road_id]]
     here = shapely.Point(extent.middle)
     nearest = min(driving, key=lambda lane: float(lane.polygon.distance(here)), default=None)

@@ -28,8 +28,7 @@ def ranks(ways: Iterable[Way]) -> defaultdict[str, int]:
     """Return the rank of each street by name: the rank of its highest class, with slip roads last."""
     ranks: defaultdict[str, int] = defaultdict(lambda: len(RANKS))
     for way in ways:
-        name = {**way.tags, **shown_name(way.tags)}.get("name", "")
-        kind = way.tags.get("highway", "")
+        name, kind = shown_name(way.tags), way.tags.get("highway", "")
         ranks[name] = min(ranks[name], RANKS.index(kind) if kind in RANKS else len(RANKS))
     return ranks
 
@@ -39,12 +38,11 @@ def headings_at(
 ) -> defaultdict[str, list[float]]:
     """Return the directions (radians) of each street at a group of junctions, by street name."""
     area = shapely.union_all([lane.polygon for lane in lanes if lane.junction_id in junctions])
-    names = {road.id: road.name for road in road_map.roads}
     headings: defaultdict[str, list[float]] = defaultdict(list)
     for lane in lanes:
         if lane.junction_id is None and area.distance(lane.polygon) < TOUCH:
             x, y = (lane.left[-1] - lane.left[0])[:2].tolist()
-            headings[names[lane.road_id]].append(math.atan2(y, x))
+            headings[road_map.names[lane.road_id]].append(math.atan2(y, x))
     return headings
 
 
@@ -66,10 +64,8 @@ def spelt(extract: Extract, name: str) -> str:
     """Return the name of a street in the spelling of the extract, from any of its names."""
     wanted = name.strip().casefold()
     for way in _streets_called(extract, name):
-        shown = {**way.tags, **shown_name(way.tags)}
-        for key in NAMES:
-            if way.tags.get(key, "").casefold() == wanted:
-                return shown.get(key, "") or name
+        key = next(key for key in NAMES if way.tags.get(key, "").casefold() == wanted)
+        return shown_name(way.tags) if key == "name" else way.tags[key]
     return name.strip()
 
 

@@ -63,8 +63,6 @@ class StreetFile:
 
     Parameters
     ----------
-    streets : int
-        Number of streets written.
     elevated : bool
         Whether the nodes have elevations.
     left_hand : bool
@@ -85,7 +83,6 @@ class StreetFile:
         Assumptions made, as messages.
     """
 
-    streets: int
     elevated: bool
     left_hand: bool
     roundabouts: tuple[frozenset[int], ...]
@@ -154,9 +151,10 @@ def write_streets(
     elevated = bool(used) and sum(height is not None for height in heights) >= MIN_ELEVATED * len(used)
     # netconvert guesses lanes, widths, pavements and signals by its own defaults. The streets are therefore written
     # with these made explicit, and with signals moved to the junctions that they control.
-    medians = _Medians(extract, [way for _, way in pieces])
+    ways = [way for _, way in pieces]
+    medians = _Medians(extract, ways)
     places = dict(zip(extract.nodes, extract.in_metres(extract.nodes.values()), strict=True))
-    signals = matched_signals(extract, [way for _, way in pieces], places)
+    signals = matched_signals(extract, ways, places)
     lines = ['<?xml version="1.0" encoding="UTF-8"?>', '<osm version="0.6">']
     for number, height in zip(used, heights, strict=True):
         lines += _node(number, extract.nodes[number], height if elevated else None, signals)
@@ -164,20 +162,16 @@ def write_streets(
         lines += _way(number, way.nodes, _tags(way, medians, left_hand=left_hand))
     lines += _restrictions(extract, {number for number, _ in pieces})
     path.write_text(os.linesep.join([*lines, "</osm>", ""]), encoding="utf-8")
-    roundabouts = joined(way.nodes for _, way in pieces if is_roundabout(way.tags))
-    slip_ends = tuple(_slip_ends(extract, [way for _, way in pieces]))
-    crossed = structures(extract, pieces, places)
     return StreetFile(
-        len(pieces),
         elevated,
         left_hand,
-        roundabouts,
-        slip_ends,
-        dict(pieces),
-        crossed,
-        signals.unmatched,
-        widened,
-        tuple(notes),
+        roundabouts=joined(way.nodes for way in ways if is_roundabout(way.tags)),
+        slip_ends=tuple(_slip_ends(extract, ways)),
+        ways=dict(pieces),
+        structures=structures(extract, pieces, places),
+        lone_signals=signals.unmatched,
+        widened=widened,
+        notes=tuple(notes),
     )
 
 
@@ -382,7 +376,7 @@ def _restrictions(extract: Extract, streets: set[int]) -> Iterator[str]:
 def _tags(way: Way, medians: "_Medians", *, left_hand: bool) -> dict[str, str]:
     """Return the tags of a street for netconvert, with explicit lanes, widths, pavements and cycle lanes."""
     given = way.tags
-    tags = {key: given[key] for key in COPIED if key in given} | shown_name(given)
+    tags = {key: given[key] for key in COPIED if key in given} | ({"name": name} if (name := shown_name(given)) else {})
     if given.get("railway") in TRACKS and "highway" not in given:
         return tags
     if given.get("highway") == "road":  # a street of unknown class, which netconvert does not have
@@ -416,16 +410,13 @@ def _tags(way: Way, medians: "_Medians", *, left_hand: bool) -> dict[str, str]:
     return tags
 
 
-def shown_name(tags: Tags) -> dict[str, str]:
-    """Return a tag with the displayed name of a street if it differs from ``name``; otherwise an empty dict.
+def shown_name(tags: Tags) -> str:
+    """Return the displayed name of a street, "" if it has none.
 
     Names in scripts that the font of the pictures lacks are replaced by ``name:en``; roads without a name use ``ref``.
     """
-    name = tags.get("name", "")
-    english = tags.get("name:en")
-    if not name:
-        return {"name": tags["ref"]} if tags.get("ref") else {}
-    return {"name": english} if english and any(character >= _FIRST_OTHER for character in name) else {}
+    name = tags.get("name") or tags.get("ref", "")
+    return tags.get("name:en") or name if any(character >= _FIRST_OTHER for character in name) else name
 
 
 def _sidewalks(way: Way, medians: "_Medians", *, left_hand: bool) -> tuple[bool, bool]:

@@ -86,7 +86,7 @@ class Place:
         self._check_spread(lanes)
         if self.description.from_centre_lines:
             driving = road_surface.in_groups(self.surfaces, ["driving"])
-            return with_other_carriageways(lanes, driving, self._names).convex_hull
+            return with_other_carriageways(lanes, driving, self.road_map.names).convex_hull
         return shapely.union_all([shapely.make_valid(lane.polygon) for lane in lanes]).convex_hull
 
     def _check_spread(self, lanes: Sequence[LaneSurface]) -> None:
@@ -142,15 +142,17 @@ class Place:
         around = self.within.convex_hull.buffer(SCENE_MARGIN)
         driving = road_surface.in_groups(self.surfaces, ["driving"])
         nearby = road_surface.local_strips(driving, shift, shifted(around, -shift))
-        area = with_other_carriageways(lanes, nearby, self._names)
+        area = with_other_carriageways(lanes, nearby, self.road_map.names)
         there = {lane.road_id for lane in nearby}
         joined = [one for one in self.junctions if there & one.roads]
         junctions = [shifted(one.carriageway, -shift) for one in joined]
-        widened = [one.road for one in tapers(nearby, joined, {road.id: road for road in self.road_map.roads})]
+        widened = [one.road for one in tapers(nearby, joined, self.road_map.roads)]
         inside = [one for one in junctions if one.intersection(area).area > MIN_SHARE_OF_JUNCTION * one.area]
         whole = closed(united([area, *inside]).simplify(TOLERANCE), JUNCTION_GAP)
-        names = {"", *(self._names.get(lane.road_id, "") for lane in lanes)}
-        roads = [own for road, own in road_surface.by_road(nearby).items() if self._names.get(road, "") in names]
+        names = {"", *(self.road_map.names.get(lane.road_id, "") for lane in lanes)}
+        roads = [
+            own for road, own in road_surface.by_road(nearby).items() if self.road_map.names.get(road, "") in names
+        ]
         links = [own for own in roads if all(leads_between(lane, whole) for lane in own)]
         whole = united([whole, *(lane.polygon for own in links for lane in own)])
         whole = united([whole, *(one for one in widened if one.intersection(whole.buffer(JUNCTION_GAP)).length > 0)])
@@ -190,7 +192,9 @@ class Place:
             nearest = nearest_junctions(self.road_map, self.surfaces, float(self.centre[0]), float(self.centre[1]), 1)
             if nearest and nearest[0][1] <= JUNCTION_REACH:
                 junctions = self._one_place(nearest[0][0])
-                return approach_lanes(self.surfaces, junctions, description.radius or DEFAULT_RADIUS, self._names)
+                return approach_lanes(
+                    self.surfaces, junctions, description.radius or DEFAULT_RADIUS, self.road_map.names
+                )
         return self.surfaces
 
     @cached_property
@@ -211,13 +215,8 @@ class Place:
         return find_junction(self.road_map, self.surfaces, id_or_name)
 
     def _approach_lanes(self) -> tuple[LaneSurface, ...]:
-        names = self._names if self.description.from_centre_lines else None
+        names = self.road_map.names if self.description.from_centre_lines else None
         return approach_lanes(self.surfaces, self._junctions, self.description.along or 0.0, names)
-
-    @cached_property
-    def _names(self) -> dict[str, str]:
-        """Names of the streets by the ids of their roads."""
-        return {road.id: road.name for road in self.road_map.roads}
 
     def _driving_area(self, junction: Junction) -> BaseGeometry:
         driving = road_surface.in_groups(self.surfaces, ["driving"])

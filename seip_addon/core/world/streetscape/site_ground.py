@@ -159,7 +159,7 @@ def _network_areas(
         for one in streets.junctions
     )
     near = [one for one in junctions if extent.intersects(one.carriageway)]
-    return street_areas(lanes, near, {road.id: road for road in streets.road_map.roads}, description.ways, built_up)
+    return street_areas(lanes, near, streets.road_map.roads, description.ways, built_up)
 
 
 def _strips(

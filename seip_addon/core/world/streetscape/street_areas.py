@@ -84,7 +84,7 @@ class StreetAreas:
 def street_areas(
     lanes: Sequence[LaneSurface],
     junctions: Sequence[JunctionArea],
-    roads: Mapping[str, Road],
+    roads: Sequence[Road],
     ways: Sequence[SideWay] = (),
     built_up: BaseGeometry = NOTHING,
 ) -> StreetAreas:
@@ -96,8 +96,8 @@ def street_areas(
         Lanes of the level.
     junctions : sequence of JunctionArea
         Junctions of the map in the same axes; only those of the lanes count.
-    roads : mapping of str to Road
-        Roads of the map by id.
+    roads : sequence of Road
+        Roads of the map.
     ways : sequence of SideWay
         Ways next to the road. Where a sidewalk among them runs along a street, no pavement is assumed.
     built_up : shapely geometry, optional
@@ -205,18 +205,16 @@ class _Taper:
     pavement: BaseGeometry
 
 
-def tapers(
-    lanes: Sequence[LaneSurface], junctions: Iterable[JunctionArea], roads: Mapping[str, Road]
-) -> Iterator[_Taper]:
+def tapers(lanes: Sequence[LaneSurface], junctions: Iterable[JunctionArea], roads: Sequence[Road]) -> Iterator[_Taper]:
     """Yield the tapers where a street gets more lanes or wider ones, along its narrower road; see `street_areas`."""
     joints = {one.id for one in junctions if one.is_joint}
-    through = [road for road in roads.values() if road.junction_id in joints and road.predecessor and road.successor]
+    through = [road for road in roads if road.junction_id in joints and road.predecessor and road.successor]
     pairs = [(road.predecessor.id, road.successor.id) for road in through if road.predecessor and road.successor]
     # A slip road that leaves or joins a street is no other part of it.
     starts, stops = (Counter(ends) for ends in zip(*pairs, strict=True)) if pairs else (Counter[str](), Counter[str]())
     own = by_road([lane for lane in lanes if lane.lane_type])
     paved = {road: [lane for lane in group if lane in in_groups(group, CARRIAGEWAY)] for road, group in own.items()}
-    outside = {road.id for road in roads.values() if road.junction_id is None}
+    outside = {road.id for road in roads if road.junction_id is None}
     areas = {road: united(lane.polygon for lane in group) for road, group in paved.items() if road in outside}
     for before, after in pairs:
         if not paved.get(before) or not paved.get(after) or starts[before] > 1 or stops[after] > 1:
