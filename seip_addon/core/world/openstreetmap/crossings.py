@@ -1,7 +1,7 @@
 """Crossings of named streets in an extract, and those that a rule selects as the sites of a network."""
 
 from collections import defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -75,18 +75,21 @@ def named_crossings(extract: Extract) -> tuple[Crossing, ...]:
             pair = tuple(sorted(streets_there))
             places[pair].append(middle)
             importances[pair] = max(importances[pair], sorted(streets_there.values())[-2])
-    found = [Crossing(pair, *middle, importances[pair]) for pair, there in places.items() for middle in _apart(there)]
+    found = [
+        Crossing(pair, *group.mean(axis=0).tolist(), importances[pair])
+        for pair, there in places.items()
+        for group in clustered(there, ONE_CROSSING)
+    ]
     return tuple(sorted(found, key=lambda one: (one.streets, one.latitude, one.longitude)))
 
 
-def _apart(places: list[tuple[float, float]]) -> Iterator[tuple[float, float]]:
-    """Yield the centres of groups of places that lie close to each other."""
-    waiting = np.array(sorted(places))
-    while len(waiting):
-        near = np.hypot(*plan_metres(waiting, waiting[0]).T) <= ONE_CROSSING
-        latitude, longitude = waiting[near].mean(axis=0).tolist()
-        yield latitude, longitude
-        waiting = waiting[~near]
+def clustered(places: Sequence[tuple[float, float]], distance: float) -> list[Float]:
+    """Return latitudes and longitudes in groups (n, 2) that are more than a distance in metres apart, largest first."""
+    points = shapely.points(plan_metres(places, places[0]))
+    areas = shapely.get_parts(shapely.union_all(shapely.buffer(points, distance / 2)))
+    of_group = [int(np.argmax(shapely.intersects(areas, point))) for point in points]
+    groups = [np.array(places)[np.array(of_group) == group] for group in dict.fromkeys(of_group)]
+    return sorted(groups, key=len, reverse=True)
 
 
 def selected_junctions(

@@ -95,13 +95,9 @@ def _landings(shapes: PlanShapes, area: BaseGeometry, carriageway: BaseGeometry)
 
 def _extended(line: Float) -> Float:
     """Return a line (n, 2) extended straight at both ends."""
-
-    def beyond(end: Float, before: Float) -> Float:
-        way = end - before
-        point: Float = end + CROSSING_REACH * way / (np.hypot(*way) or 1.0)
-        return point
-
-    return np.array([beyond(line[0], line[1]), *line, beyond(line[-1], line[-2])])
+    outwards = line[[0, -1]] - line[[1, -2]]
+    ends = line[[0, -1]] + CROSSING_REACH * outwards / np.maximum(np.hypot(*outwards.T), 1e-9)[:, None]
+    return np.vstack([ends[:1], line, ends[1:]])
 
 
 def _corridor(line: Float, tags: Tags) -> BaseGeometry:

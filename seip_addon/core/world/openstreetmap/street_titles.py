@@ -6,15 +6,14 @@ import math
 from collections import defaultdict
 from collections.abc import Collection, Iterable, Mapping, Sequence
 
-import numpy as np
 import shapely
 
 from ...errors import SeipError
-from ...geometry.tangent_plane import plan_metres
 from ..opendrive.lanes import LaneSurface
 from ..opendrive.road_map import RoadMap
 from ..streetscape.intersections import SAME_DIRECTION, TOUCH
-from .extract import Extract, Node, Way
+from .crossings import clustered
+from .extract import Extract, Way
 from .streets import CLASSES, is_street, shown_name
 
 MAX_JUNCTION_DISTANCE = 60.0  # metres from a requested place to its junction at most
@@ -83,30 +82,18 @@ def meeting_place(extract: Extract, names: tuple[str, ...]) -> tuple[tuple[float
     if not shared:
         both = " and ".join(map(repr, names))
         raise SeipError(f"{both} do not meet in {extract.name}: name streets that share a node")
-    groups: list[list[Node]] = []
-    for node in (extract.nodes[number] for number in shared):
-        # Single-linkage clustering: a node merges all groups that have a node near it. Dual carriageways that cross
-        # share up to four nodes, which are one place.
-        met = [group for group in groups if _away(node, group) < MAX_JUNCTION_DISTANCE]
-        groups = [*(group for group in groups if group not in met), [node, *itertools.chain(*met)]]
-    places = [
-        (sum(node.latitude for node in group) / len(group), sum(node.longitude for node in group) / len(group))
-        for group in sorted(groups, key=len, reverse=True)
-    ]
+    # Dual carriageways that cross share up to four nodes, which are one place.
+    nodes_there = [(extract.nodes[number].latitude, extract.nodes[number].longitude) for number in shared]
+    places = [group.mean(axis=0).tolist() for group in clustered(nodes_there, MAX_JUNCTION_DISTANCE)]
+    place = (places[0][0], places[0][1])
     if len(places) == 1:
-        return places[0], ()
+        return place, ()
     first, *others = [f"{latitude:.5f} {longitude:.5f}" for latitude, longitude in places[:4]]
     note = (
         f"{' and '.join(names)} meet in {len(places)} places; the one at {first} is used: for a different one give "
         f"--near-latlon {' or '.join(others)}"
     )
-    return places[0], (note,)
-
-
-def _away(node: Node, others: Sequence[Node]) -> float:
-    """Return the distance from a node to the nearest of others, metres."""
-    places = plan_metres([(other.latitude, other.longitude) for other in others], (node.latitude, node.longitude))
-    return float(np.hypot(*places.T).min())
+    return place, (note,)
 
 
 def _streets_called(extract: Extract, name: str) -> list[Way]:

@@ -309,8 +309,9 @@ def _pieces(extract: Extract, window: tuple[float, float, float, float], *, serv
             and west <= node.longitude <= east
             for one in way.nodes
         ]
-        for place, (first, last) in enumerate(_runs(inside)):
-            nodes = way.nodes[max(first - 1, 0) : last + 1]  # one node beyond, where the extract has it
+        runs = [list(run) for held, run in itertools.groupby(range(len(inside)), inside.__getitem__) if held]
+        for place, run in enumerate(runs):
+            nodes = way.nodes[max(run[0] - 1, 0) : run[-1] + 2]  # one node beyond, where the extract has it
             # Every piece shares the tags object of its way: `bridges` and `heights` find the pieces of one way by its
             # identity.
             held = tuple(one for one in nodes if one in extract.nodes)
@@ -318,17 +319,6 @@ def _pieces(extract: Extract, window: tuple[float, float, float, float], *, serv
                 continue
             fresh += place > 0
             yield (number if place == 0 else fresh), Way(held, way.tags)
-
-
-def _runs(inside: list[bool]) -> Iterator[tuple[int, int]]:
-    """Yield the first index and the index after the last of each run of True values."""
-    start = None
-    for place, held in enumerate([*inside, False]):
-        if held and start is None:
-            start = place
-        elif not held and start is not None:
-            yield start, place
-            start = None
 
 
 def _node(number: int, node: Node, height: float | None, signals: Signals) -> list[str]:
