@@ -189,11 +189,11 @@ def _of_extract(source: Path, request: SiteRequest, map_path: Path | None) -> Ge
         name=described.name or found.name,
         level=request.level,
     )
-    description, more, merging = yield from _with_terrain(site.streets, description, request)
+    description, more, merging = yield from _with_terrain(site.network.streets, description, request)
     yield Progress(0, 0, "heights of streets")
     site = replace(site, description=description).on_ground()
     try:
-        model = yield from street_model(site.streets, site.description)
+        model = yield from street_model(site.network.streets, site.description)
     except UnclearLevelError as error:
         if map_path is None:
             raise

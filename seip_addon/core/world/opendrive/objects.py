@@ -72,18 +72,14 @@ class PlacedObject:
 
 @dataclass(frozen=True, eq=False)
 class PlacedSignal:
-    """A signal in map coordinates.
-
-    Depending on the map this is the foot of the post or the lamp above the carriageway.
+    """A traffic light in map coordinates: depending on the map the foot of its post, or the lamp above the carriageway.
 
     Parameters
     ----------
     road_id : str
         Road that it applies to.
-    id, name, kind : str
-        Id, name and type as in the file.
-    dynamic : bool
-        Whether it changes, as a traffic light does.
+    name : str
+        Name as in the file.
     position : (3,) float64, metres
         Position in map coordinates.
     yaw : float, radians
@@ -92,10 +88,7 @@ class PlacedSignal:
     """
 
     road_id: str
-    id: str
     name: str
-    kind: str
-    dynamic: bool
     position: Float
     yaw: float
 

@@ -86,15 +86,16 @@ def read_objects(road: Road, node: Node) -> Iterator[PlacedObject]:
 
 
 def read_signals(road: Road, node: Node) -> Iterator[PlacedSignal]:
-    """Yield the signals of a road."""
+    """Yield the traffic lights of a road: its signals that change."""
     for child in node.children("signals", "signal"):
+        if not child.flag("dynamic"):
+            continue
         item = child.within(f"signal {child.text('id', '')}")
         s = np.array([item.number("s")])
         position = _point(road, float(s[0]), item.number("t"), item.number("zOffset", 0.0))
         turned = math.pi if item.text("orientation", "none") == "-" else 0.0
         yaw = float(road.frame(s).heading[0]) + turned + item.number("hOffset", 0.0)
-        number, name, kind = (item.text(key, "") for key in ("id", "name", "type"))
-        yield PlacedSignal(road.id, number, name, kind, dynamic=item.flag("dynamic"), position=position, yaw=yaw)
+        yield PlacedSignal(road.id, item.text("name", ""), position, yaw)
 
 
 def _tunnel(road: Road, node: Node) -> PlacedObject:

@@ -191,7 +191,7 @@ class RoadMap:
     objects : tuple of PlacedObject
         Objects, with repeated ones as often as they are repeated.
     signals : tuple of PlacedSignal
-        Signals.
+        Traffic lights.
     attribution : tuple of str
         Credits in the header's ``<userData code="attribution">``.
 

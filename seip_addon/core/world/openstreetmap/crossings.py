@@ -76,7 +76,7 @@ def named_crossings(extract: Extract) -> tuple[Crossing, ...]:
             places[pair].append(middle)
             importances[pair] = max(importances[pair], sorted(streets_there.values())[-2])
     found = [
-        Crossing(pair, *group.mean(axis=0).tolist(), importances[pair])
+        Crossing(pair, float(group[:, 0].mean()), float(group[:, 1].mean()), importances[pair])
         for pair, there in places.items()
         for group in clustered(there, ONE_CROSSING)
     ]

@@ -199,10 +199,12 @@ def _streets(network: StreetNetwork, pieces: dict[str, tuple[str, float, float]]
         geo_reference=network.projection,
         roads=tuple(road for road, _ in roads),
         junctions=tuple(Junction(number, number) for number in network.shapes),
+        objects=tuple(_crossings(network)),
+        signals=tuple(_signals(network)),
     )
     lanes = tuple(itertools.chain.from_iterable(lanes for _, lanes in roads))
     areas = tuple(_junction_areas(network, lanes, frozenset(_joints(network))))
-    return StreetMap(road_map, lanes, tuple(_crossings(network)), tuple(_signals(network)), areas)
+    return StreetMap(road_map, lanes, areas)
 
 
 def _type(lane: NetworkLane) -> str:
@@ -432,7 +434,4 @@ def _signals(network: StreetNetwork) -> Iterator[PlacedSignal]:
             own = edge.lanes[int(lane[1])]
             if _type(own) in ("driving", "tram") and len(own.line) > 1:
                 x, y = own.line[-1] - own.line[-2]
-                position = own.points[-1] + [0.0, 0.0, LAMP_HEIGHT]
-                number = f"{one['tl']}_{one['linkIndex']}"
-                heading = math.atan2(y, x)
-                yield PlacedSignal(edge.id, number, "", "1000011", dynamic=True, position=position, yaw=heading)
+                yield PlacedSignal(edge.id, "", own.points[-1] + [0.0, 0.0, LAMP_HEIGHT], math.atan2(y, x))

@@ -98,10 +98,8 @@ class ExtractSite:
 
     Parameters
     ----------
-    streets : StreetMap
-        Streets as netconvert lays them out, with the crossings of the extract: flat, unless the extract has heights.
     network : NetworkMap
-        Network of these streets, on which traffic is simulated.
+        Streets as netconvert lays them out, with the crossings of the extract: flat, unless the extract has heights.
     description : SiteDescription
         Objects next to the streets, and the extent of the region.
     notes : tuple of str
@@ -114,7 +112,6 @@ class ExtractSite:
         Area that notes refer to, about the region of interest; map coordinates.
     """
 
-    streets: StreetMap
     network: NetworkMap
     description: SiteDescription
     notes: tuple[str, ...]
@@ -124,13 +121,13 @@ class ExtractSite:
 
     def on_ground(self) -> "ExtractSite":
         """Return the same site with its streets raised to the ground, onto bridges and into underpasses."""
-        relief, road_map = self.description.relief, self.streets.road_map
+        relief, streets = self.description.relief, self.network.streets
         ground = None if relief is None else relief.rise
-        heights = street_heights(road_map, self.source, self.shapes, ground)
+        heights = street_heights(streets.road_map, self.source, self.shapes, ground)
         raised = replace(self, notes=(*self.notes, *heights.notes, *self._ramp_notes(heights)))
         if any(along_road.any() for _, along_road in heights.profiles.values()):
-            streets, network = self.streets.raised(heights.above_ground), self.network.raised(heights.profiles)
-            raised = replace(raised, streets=streets, network=network)
+            network = replace(self.network.raised(heights.profiles), streets=streets.raised(heights.above_ground))
+            raised = replace(raised, network=network)
             relief = level_land(0.0) if relief is None and not self.source.elevated else relief
         if relief is None:
             return raised
@@ -139,7 +136,7 @@ class ExtractSite:
 
     def _ramp_notes(self, heights: StreetHeights) -> Iterator[str]:
         """Yield a note on the assumed heights of bridges, underpasses and their ramps in the area."""
-        road_map = self.streets.road_map
+        road_map = self.network.streets.road_map
         names = street_names(road_map)
         moved: dict[str, float] = {}
         for number, (along, above) in heights.above_ground.items():
@@ -218,7 +215,8 @@ def site_of_extract(
         *lone_signals([node for node in lone if extent.seen.intersects(shapely.Point(shapes.point(node)))]),
     )
     sidewalks = shapely.MultiLineString([way.line for way in description.ways if way.line is not None])
-    return ExtractSite(streets, network.walking_on(sidewalks), description, notes, source, shapes, extent.seen)
+    network = replace(network.walking_on(sidewalks), streets=streets)
+    return ExtractSite(network, description, notes, source, shapes, extent.seen)
 
 
 def _extract_around(

@@ -234,7 +234,7 @@ def _local(item: _Item, origin: Float) -> _Item:
 def _map_objects(streets: StreetMap, street: SiteGround) -> tuple[PlacedObject, ...]:
     """Return the objects of the map within the extent, on the ground, in local axes."""
     area = shifted(street.extent, street.origin)
-    near = (one for one in streets.objects if extent_in_plan(one).intersects(area))
+    near = (one for one in streets.road_map.objects if extent_in_plan(one).intersects(area))
     # An object is raised as a whole by the ground under its position.
     return tuple(one.moved(on_relief(one.position, street.relief) - one.position - street.origin) for one in near)
 
@@ -244,7 +244,7 @@ def _map_signals(streets: StreetMap, street: SiteGround, levels: Levels) -> list
     away, area = levels.other_roads(), shifted(street.extent, street.origin)
     return [
         replace(one, position=on_relief(one.position, street.relief) - street.origin)
-        for one in streets.signals
+        for one in streets.road_map.signals
         if one.road_id not in away and area.intersects(shapely.Point(one.position[:2]))
     ]
 

@@ -9,7 +9,6 @@ from shapely.geometry.base import BaseGeometry
 from ...arrays import Float
 from ...progress import Progress
 from ..opendrive.lanes import LaneSurface, lane_surfaces
-from ..opendrive.objects import PlacedObject, PlacedSignal
 from ..opendrive.profile import Profile
 from ..opendrive.road_map import RoadMap
 from .road_surface import with_rows_at
@@ -51,21 +50,15 @@ class StreetMap:
     Parameters
     ----------
     road_map : RoadMap
-        Roads with their names and links; those of a network have no lane sections.
+        Roads with their names and links, objects and traffic lights; roads of a network have no lane sections.
     lanes : tuple of LaneSurface
         Lanes of all roads.
-    objects : tuple of PlacedObject
-        Objects, among them the crossings.
-    signals : tuple of PlacedSignal
-        Traffic lights and signs.
     junctions : tuple of JunctionArea
         Areas of the junctions of a network; empty for OpenDRIVE, whose junctions are the lanes in them.
     """
 
     road_map: RoadMap
     lanes: tuple[LaneSurface, ...]
-    objects: tuple[PlacedObject, ...] = ()
-    signals: tuple[PlacedSignal, ...] = ()
     junctions: tuple[JunctionArea, ...] = ()
 
     def raised(self, profiles: Profiles) -> "StreetMap":
@@ -96,7 +89,7 @@ def opendrive_streets(road_map: RoadMap) -> Generator[Progress, None, StreetMap]
         if number % ROADS_PER_STEP == 0:
             yield Progress(number, len(road_map.roads), "roads")
         lanes += lane_surfaces(road)
-    return StreetMap(road_map, tuple(lanes), road_map.objects, road_map.signals)
+    return StreetMap(road_map, tuple(lanes))
 
 
 def _linear(along: Float, heights: Float) -> Profile:

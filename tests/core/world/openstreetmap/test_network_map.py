@@ -83,11 +83,10 @@ def test_a_junction_of_two_arms_is_a_joint_whose_lanes_are_those_of_the_street(t
 
 def test_crossings_and_signals_are_placed(tmp_path):
     streets = read(tmp_path).streets
-    (crossing,) = streets.objects
+    (crossing,) = streets.road_map.objects
     assert crossing.position[:2] == pytest.approx([100.0, -2.0])
     assert (crossing.length, crossing.width) == pytest.approx((4.0, 6.0))
-    (signal,) = streets.signals
-    assert signal.dynamic
+    (signal,) = streets.road_map.signals
     assert signal.position[:2] == pytest.approx([98.0, -1.6])
 
 
