@@ -9,7 +9,7 @@ from shapely.geometry.base import BaseGeometry
 from ...arrays import Float
 from ...progress import Progress
 from ..opendrive.lanes import LaneSurface, lane_surfaces
-from ..opendrive.profile import Profile
+from ..opendrive.profile import linear_profile
 from ..opendrive.road_map import RoadMap
 from .road_surface import with_rows_at
 
@@ -64,7 +64,7 @@ class StreetMap:
     def raised(self, profiles: Profiles) -> "StreetMap":
         """Return the streets with new heights of the roads, linear between the given stations."""
         roads = (
-            replace(road, elevation=_linear(*profiles[road.id])) if road.id in profiles else road
+            replace(road, elevation=linear_profile(*profiles[road.id])) if road.id in profiles else road
             for road in self.road_map.roads
         )
         lanes = (_raised(lane, *profiles[lane.road_id]) if lane.road_id in profiles else lane for lane in self.lanes)
@@ -90,12 +90,6 @@ def opendrive_streets(road_map: RoadMap) -> Generator[Progress, None, StreetMap]
             yield Progress(number, len(road_map.roads), "roads")
         lanes += lane_surfaces(road)
     return StreetMap(road_map, tuple(lanes))
-
-
-def _linear(along: Float, heights: Float) -> Profile:
-    lengths = np.diff(along)
-    slopes = np.divide(np.diff(heights), lengths, out=np.zeros(len(lengths)), where=lengths > 0)
-    return Profile(along[:-1], np.column_stack([heights[:-1], slopes, np.zeros((len(slopes), 2))]))
 
 
 def _raised(lane: LaneSurface, along: Float, heights: Float) -> LaneSurface:
