@@ -12,7 +12,7 @@ from ...errors import SeipError
 from ...geometry.orientation import orientation
 from .document import Node
 from .objects import TUNNEL, Outline, PlacedObject, PlacedSignal
-from .road_map import Road
+from .road_map import Road, lifted
 from .sampling import sample
 
 _MAX_COPIES = 10_000
@@ -210,7 +210,7 @@ def _strip(item: _Object, ends: Float) -> PlacedObject:
     def lines(s: Float) -> Float:
         """Return the left and right edge at the foot, and the height of the top above it as a third line."""
         t_here, half, up_here, top = (np.interp(s, ends[:, 0], pair) for pair in (t, width / 2.0, up, height))
-        left, right = (_lifted(road.place(s, t_here + sign * half), up_here) for sign in (1.0, -1.0))
+        left, right = (lifted(road.place(s, t_here + sign * half), up_here) for sign in (1.0, -1.0))
         return np.stack([left, right, np.column_stack([np.zeros((len(s), 2)), top])], axis=1)
 
     starts = np.concatenate([road.reference_line.s, road.elevation.start, road.superelevation.start])
@@ -229,9 +229,4 @@ def _strip(item: _Object, ends: Float) -> PlacedObject:
 
 def _point(road: Road, s: float, t: float, up: float) -> Float:
     """Return the point (3,) at a height (metres) vertically above a place of the road."""
-    return np.asarray(_lifted(road.place(np.array([s]), np.array([t])), np.array([up]))[0])
-
-
-def _lifted(points: Float, height: Float) -> Float:
-    """Return points (k, 3) lifted straight up by (k,) metres."""
-    return np.asarray(points + height[:, None] * np.array([0.0, 0.0, 1.0]))
+    return np.asarray(lifted(road.place(np.array([s]), np.array([t])), np.array([up]))[0])

@@ -129,6 +129,11 @@ class Road:
         return frame.origin + t[:, None] * frame.left
 
 
+def lifted(points: Float, height: Float) -> Float:
+    """Return points (k, 3) lifted straight up by (k,) metres, so that they stay where they are in plan."""
+    return np.asarray(points + height[:, None] * np.array([0.0, 0.0, 1.0]))
+
+
 @dataclass(frozen=True, eq=False)
 class RoadFrame:
     """Moving axes of a road at k stations.

@@ -313,28 +313,16 @@ class _Place:
     ----------
     crossing : Crossing
         Ways that cross.
-    own : (n,) int64
-        Places of the street on the bridge or in the underpass.
-    others : (m,) int64
-        Places of the crossed street; empty if the crossed way is not a street.
+    upper, lower : (n,) and (m,) int64
+        Places of the upper and of the lower street; empty for a crossed way that is not a street.
     ground : float, metres
         Height of a crossed way that is not a street.
     """
 
     crossing: Crossing
-    own: Integer
-    others: Integer
+    upper: Integer
+    lower: Integer
     ground: float
-
-    @property
-    def upper(self) -> Integer:
-        """Places of the upper street."""
-        return self.own if self.crossing.is_bridge else self.others
-
-    @property
-    def lower(self) -> Integer:
-        """Places of the lower street."""
-        return self.others if self.crossing.is_bridge else self.own
 
 
 def _crossing_places(graph: _Graph, crossings: Iterable[Crossing], shapes: PlanShapes) -> Iterator[_Place]:
@@ -353,8 +341,10 @@ def _crossing_places(graph: _Graph, crossings: Iterable[Crossing], shapes: PlanS
                 ways = {crossing.street, *graph.onward(crossing.street)}.difference(crossed)
                 middle = shapely.get_coordinates(common.centroid)
                 mine = np.concatenate([_within(graph, way, other_area, beyond=1) for way in sorted(ways)])
-                others = [np.empty(0, dtype=np.int64), *(_within(graph, way, street_area) for way in crossed)]
-                yield _Place(crossing, mine, np.concatenate(others), float(graph.ground(middle)[0]))
+                found = [np.empty(0, dtype=np.int64), *(_within(graph, way, street_area) for way in crossed)]
+                others = np.concatenate(found)
+                upper, lower = (mine, others) if crossing.is_bridge else (others, mine)
+                yield _Place(crossing, upper, lower, float(graph.ground(middle)[0]))
 
 
 def _within(graph: _Graph, way: int, area: BaseGeometry, beyond: int = 0) -> Integer:

@@ -14,7 +14,6 @@ from ...errors import SeipError
 from ...geometry.plan import covered_share, united, without
 from ...geometry.solids import Solid
 from ...progress import Progress
-from ...site.obstruction import NO_OBSTACLES_MESSAGE, can_hide
 from ...site.post_rules import RULES, KeepOffArea
 from ...site.roles import AREA_OVERLAYS, Role
 from ...site.scene_geometry import ASSUMED, NamedArea
@@ -157,7 +156,6 @@ def street_model(streets: StreetMap, description: SiteDescription) -> Generator[
     described, clear_notes = clear(described, street.roadside.carriageway, street.roadside.mouths)
     objects, covered_notes = _without_covered(_map_objects(streets, street), described)
     furniture = _furniture(objects, _map_signals(streets, street, levels), described, street)
-    other_levels = other_level_parts(street)
     yield _step("carriageway")
     surface = street_surface(street)
     yield _step("pavements")
@@ -167,15 +165,13 @@ def street_model(streets: StreetMap, description: SiteDescription) -> Generator[
     parts = [
         *laid,
         verge_part(street, furniture.parts, laid),
-        *other_levels,
+        *other_level_parts(street),
         marking_part(street, has_signals=bool(furniture.signals or described.signal_poles)),
         *furniture.parts,
         *_overlay_parts(place, described, objects, street),
     ]
     yield _step("checks")
     names = street_names(road_map)
-    seen = _sight_area(street.region, parts)
-    bare = () if any(_hides(part, seen) for part in (*furniture.parts, *other_levels)) else (NO_OBSTACLES_MESSAGE,)
     unnamed = UNNAMED_ROAD if description.from_centre_lines else ""
     warnings = road_warnings(road_map, (*street.lanes, *street.crossing.lanes), names, origin, unnamed)
     return SiteModel(
@@ -193,7 +189,7 @@ def street_model(streets: StreetMap, description: SiteDescription) -> Generator[
             *_furniture_notes(objects, furniture.signals),
             *_tunnel_notes(objects, names),
         ),
-        warnings=(*bare, *warnings),
+        warnings=warnings,
         places=named_places(
             street.lanes,
             names,
@@ -281,20 +277,6 @@ def _overlay_parts(
         *_area_parts(described, street),
         *_keep_off_parts(described, objects, street),
     ]
-
-
-def _sight_area(region: BaseGeometry, parts: Sequence[Part]) -> BaseGeometry:
-    """Return the area in plan that lies between positions of sensors and the region of interest, local axes."""
-    posts = [part.foot[:2] for part in parts if Role.POLES in part.roles]
-    return shapely.union_all([region.buffer(CANDIDATE_MARGIN), shapely.MultiPoint(posts)]).convex_hull
-
-
-def _hides(part: Part, area: BaseGeometry) -> bool:
-    """Return whether an occluder reaches into an area and is large enough to hide targets there."""
-    if Role.OCCLUDERS not in part.roles:
-        return False
-    plan = shapely.MultiPoint(part.solid.vertices[:, :2] + part.foot[:2]).convex_hull
-    return can_hide(part.solid.vertices) and bool(area.intersects(plan))
 
 
 def _without_covered(
