@@ -171,11 +171,12 @@ def street_model(streets: StreetMap, description: SiteDescription) -> Generator[
         *_overlay_parts(place, described, objects, street),
     ]
     yield _step("checks")
+    in_junction = description.junction and f"junction {description.junction}"
     names = street_names(road_map)
     unnamed = UNNAMED_ROAD if description.from_centre_lines else ""
     warnings = road_warnings(road_map, (*street.lanes, *street.crossing.lanes), names, origin, unnamed)
     return SiteModel(
-        name=description.name or _map_title(road_map.name, description.junction),
+        name=description.name or ", ".join(filter(None, (road_map.name, in_junction))),
         origin=origin,
         geo_reference=road_map.geo_reference,
         header_offset=road_map.header_offset,
@@ -287,19 +288,14 @@ def _without_covered(
     if not modelled:
         return objects, ()
     tree = shapely.STRtree(modelled)
-    kept = tuple(one for one in objects if kind_of(one) is not Kind.BUILDING or not _is_covered(one, tree))
+    kept = tuple(
+        one
+        for one in objects
+        if kind_of(one) is not Kind.BUILDING or covered_share(area_in_plan(one), tree) <= MAX_COVERED
+    )
     count = len(objects) - len(kept)
     note = f"{counted(count, 'building')} of the map replaced by those of the survey"
     return kept, (note,) if count else ()
-
-
-def _is_covered(placed: PlacedObject, modelled: shapely.STRtree) -> bool:
-    return covered_share(area_in_plan(placed), modelled) > MAX_COVERED
-
-
-def _map_title(name: str, junction: str | None) -> str:
-    """Return the title of a site without a description: the map, and the junction that was asked for."""
-    return ", ".join(filter(None, (name, junction and f"junction {junction}")))
 
 
 def _with_source(part: Part, description: SiteDescription) -> Part:

@@ -126,7 +126,7 @@ class Place:
         driving = road_surface.in_groups(lanes, ["driving"])
         near = road_surface.local_strips(driving, shift, within) if driving else ()
         if near:
-            outline = road_surface.without_small_holes(road_surface.lane_outline(near))
+            outline = road_surface.without_holes(road_surface.lane_outline(near), least=road_surface.MAX_HOLE)
             if self.description.from_centre_lines:
                 outline = self._whole_streets(near, shift)
             region = road_surface.without_crumbs(outline.intersection(within))

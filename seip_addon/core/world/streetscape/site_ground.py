@@ -56,11 +56,6 @@ class OtherLevels:
         """Area in plan of the roads of other levels on the ground."""
         return outline(self.on_ground, road_surface.SNAP_GRID)
 
-    @cached_property
-    def off_posts(self) -> BaseGeometry:
-        """Area in plan next to which the verge is not used for posts."""
-        return self.area.union(self.decks)
-
 
 @dataclass(frozen=True, eq=False)
 class SiteGround:

@@ -72,11 +72,10 @@ def street_surface(street: SiteGround) -> StreetSurface:
 
 
 def _network_surface(street: SiteGround, areas: StreetAreas) -> StreetSurface:
-    groups = dict(areas.groups)
     terrain = Terrain(triangles_of(road_surface.in_groups(street.lanes, road_surface.CARRIAGEWAY)))
     laid = {
         group: terrain.drape(without_crumbs(area.intersection(street.extent)), spacing=OVERLAY_SPACING)
-        for group, area in groups.items()
+        for group, area in areas.groups.items()
     }
     pavement = without_crumbs(areas.pavement.intersection(street.extent))
     triangles = terrain.drape(pavement, spacing=OVERLAY_SPACING, above=road_surface.KERB_HEIGHT)
@@ -151,7 +150,8 @@ def _verge_strip(street: SiteGround, sides: BaseGeometry) -> Part:
     """Return a strip of verge along sides of the carriageway, except where the road continues and next to bridges."""
     inner, outer = VERGE_STRIP
     strip = without(sides.buffer(outer, cap_style="flat"), street.roadside.filled.buffer(inner))
-    strip = without(strip, united([street.crossing.off_posts.buffer(outer), street.built_up]))
+    off_posts = street.crossing.area.union(street.crossing.decks)
+    strip = without(strip, united([off_posts.buffer(outer), street.built_up]))
     near = strip.intersection(street.region.buffer(CANDIDATE_MARGIN))
     return area_part("Verge strip", near, Role.CANDIDATE_AREAS, street)
 
