@@ -196,7 +196,6 @@ def site_of_extract(
         junction=junction.id if place.radius is None and junction is not None else None,
         radius=place.radius,
         approaches=place.approaches,
-        from_centre_lines=True,
         roundabouts=extent.roundabouts,
         map_source=FROM_EXTRACT,
         widths_assumed=_assumed_widths(near_streets),

@@ -226,11 +226,8 @@ class SiteDescription:
     relief : Relief or None
         Ground under the map, which is flat, or level land next to ramps and underpasses; None if the height of the
         land is unknown.
-    from_centre_lines : bool
-        Whether the map was made from centre lines of streets: then junctions within `JUNCTION_REACH` metres of each
-        other are one, and small holes between their lanes are not islands.
     roundabouts : tuple of frozenset of str
-        Junction ids of each roundabout, in a map made from centre lines.
+        Junction ids of each roundabout in a network.
     map_source : str
         Source of the roads.
     widths_assumed : frozenset of str
@@ -261,7 +258,6 @@ class SiteDescription:
     solids: tuple[PlacedSolid, ...] = ()
     keep_off_areas: tuple[KeepOffArea, ...] = ()
     relief: Relief | None = None
-    from_centre_lines: bool = False
     roundabouts: tuple[frozenset[str], ...] = ()
     map_source: str = FROM_MAP
     widths_assumed: frozenset[str] = frozenset()

@@ -173,7 +173,7 @@ def street_model(streets: StreetMap, description: SiteDescription) -> Generator[
     yield _step("checks")
     in_junction = description.junction and f"junction {description.junction}"
     names = street_names(road_map)
-    unnamed = UNNAMED_ROAD if description.from_centre_lines else ""
+    unnamed = UNNAMED_ROAD if streets.junctions else ""
     warnings = road_warnings(road_map, (*street.lanes, *street.crossing.lanes), names, origin, unnamed)
     return SiteModel(
         name=description.name or ", ".join(filter(None, (road_map.name, in_junction))),
@@ -196,7 +196,7 @@ def street_model(streets: StreetMap, description: SiteDescription) -> Generator[
             names,
             objects,
             street.region,
-            unnamed=UNNAMED_STREET if description.from_centre_lines else "",
+            unnamed=UNNAMED_STREET if streets.junctions else "",
             rings=ring_roads(road_map.roads, description.roundabouts),
         ),
         attribution=tuple(dict.fromkeys((*road_map.attribution, *description.attribution))),
@@ -373,12 +373,12 @@ def _area_parts(description: SiteDescription, street: SiteGround) -> list[Part]:
 def _keep_off_parts(description: SiteDescription, placed: Sequence[PlacedObject], street: SiteGround) -> Iterator[Part]:
     """Yield the areas from which rules exclude new posts, cut to the surroundings of the region.
 
-    Landings at the crossings of the map are added unless it was made from centre lines: netconvert guesses crossings.
+    Landings at the crossings of the map are added unless it is a network: netconvert guesses crossings.
     """
     areas = [(one.rule, one.polygon) for one in description.keep_off_areas]
     if street.areas is not None:
         areas.append(("islands", medians(street.roadside)))
-    if not description.from_centre_lines:
+    else:
         areas += [("landings", landing) for landing in landings(placed)]
     near = without(street.region.buffer(CANDIDATE_MARGIN), street.roadside.carriageway)
     for number, (rule, about) in enumerate(RULES.items()):

@@ -51,7 +51,8 @@ class Place:
     description : SiteDescription
         Choice of the place and its region.
     junctions : tuple of JunctionArea
-        Areas of the junctions of a network.
+        Areas of the junctions of a network, which was made from centre lines of streets: junctions within
+        `JUNCTION_REACH` metres of each other are one place there. Empty for OpenDRIVE.
     """
 
     road_map: RoadMap
@@ -84,7 +85,7 @@ class Place:
             return shapely.Point(self.centre).buffer(self.description.radius or DEFAULT_RADIUS, quad_segs=32)
         lanes = self._approach_lanes()
         self._check_spread(lanes)
-        if self.description.from_centre_lines:
+        if self.junctions:
             driving = road_surface.in_groups(self.surfaces, ["driving"])
             return with_other_carriageways(lanes, driving, self.road_map.names).convex_hull
         return shapely.union_all([shapely.make_valid(lane.polygon) for lane in lanes]).convex_hull
@@ -127,7 +128,7 @@ class Place:
         near = road_surface.local_strips(driving, shift, within) if driving else ()
         if near:
             outline = road_surface.without_holes(road_surface.lane_outline(near), least=road_surface.MAX_HOLE)
-            if self.description.from_centre_lines:
+            if self.junctions:
                 outline = self._whole_streets(near, shift)
             region = road_surface.without_crumbs(outline.intersection(within))
             if not region.is_empty:
@@ -176,19 +177,19 @@ class Place:
         ]
 
     def _title(self, junction: Junction) -> str:
-        """Return the title of a junction: its streets in a map made from centre lines, otherwise its id."""
-        name = self.description.name if self.description.from_centre_lines else ""
+        """Return the title of a junction: its streets in a network, otherwise its id."""
+        name = self.description.name if self.junctions else ""
         return name if name.startswith("Junction ") else f"Junction {name or junction.id}"
 
     def _lanes_of_region(self) -> Sequence[LaneSurface]:
         """Return the lanes that the region of interest may lie on.
 
-        In a map made from centre lines, a circle around a junction excludes streets that only pass by.
+        In a network, a circle around a junction excludes streets that only pass by.
         """
         description = self.description
         if description.along is not None:
             return self._approach_lanes()
-        if description.from_centre_lines and description.near is not None:
+        if self.junctions and description.near is not None:
             nearest = nearest_junctions(self.road_map, self.surfaces, float(self.centre[0]), float(self.centre[1]), 1)
             if nearest and nearest[0][1] <= JUNCTION_REACH:
                 junctions = self._one_place(nearest[0][0])
@@ -207,7 +208,7 @@ class Place:
         return self._one_place(self._junction)
 
     def _one_place(self, junction: Junction) -> frozenset[str]:
-        if not self.description.from_centre_lines:
+        if not self.junctions:
             return frozenset({junction.id})
         return intersection(self.surfaces, junction.id, self.description.roundabouts)
 
@@ -215,7 +216,7 @@ class Place:
         return find_junction(self.road_map, self.surfaces, id_or_name)
 
     def _approach_lanes(self) -> tuple[LaneSurface, ...]:
-        names = self.road_map.names if self.description.from_centre_lines else None
+        names = self.road_map.names if self.junctions else None
         return approach_lanes(self.surfaces, self._junctions, self.description.along or 0.0, names)
 
     def _driving_area(self, junction: Junction) -> BaseGeometry:
@@ -226,7 +227,7 @@ class Place:
 
     def _central_box(self, junction: Junction) -> BaseGeometry:
         """Return the smallest rectangle around a junction's driving lanes, aligned with its roads if possible."""
-        if self.description.from_centre_lines:
+        if self.junctions:
             driving = road_surface.in_groups(self.surfaces, ["driving"])
             ring = ring_roads(self.road_map.roads, self.description.roundabouts, self._one_place(junction))
             around = [shapely.make_valid(lane.polygon) for lane in driving if lane.road_id in ring]

@@ -117,7 +117,7 @@ def site_ground(
     """
     extent, relief = region.convex_hull.buffer(SCENE_MARGIN, quad_segs=16), description.relief
     lanes = _strips(levels.studied, origin, extent, relief)
-    if description.from_centre_lines:
+    if streets.junctions:
         lanes = road_surface.without_loose_ends(lanes, region, extent)
     others = _strips(levels.others, origin, extent, relief, kerbs=False)
     houses = _built_up(streets, lanes, description) if streets.junctions else NOTHING
