@@ -12,23 +12,8 @@ from ...geometry.solids import fence
 from ...site.roles import Role
 from ...site.scene_geometry import DESCRIBED
 from . import street_furniture
-from .description import (
-    Building,
-    Poles,
-    SiteDescription,
-    Slab,
-    Trees,
-    Wall,
-)
-from .map_furniture import (
-    POLE_HEIGHT,
-    POST_RADIUS,
-    arm_heading,
-    building_parts,
-    facade,
-    pole_part,
-    tree_part,
-)
+from .description import Building, Poles, SiteDescription, Slab, Trees, Wall
+from .map_furniture import POLE_HEIGHT, POST_RADIUS, arm_heading, building_parts, facade, pole_part, tree_part
 from .parts import Part
 from .site_ground import SiteGround
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Generator, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 import shapely
@@ -14,34 +14,17 @@ from ...errors import SeipError
 from ...geometry.plan import covered_share, united, without
 from ...geometry.solids import Solid
 from ...progress import Progress
-from ...site.post_rules import RULES, KeepOffArea
+from ...site.post_rules import RULES
 from ...site.roles import AREA_OVERLAYS, Role
 from ...site.scene_geometry import ASSUMED, NamedArea
 from ...site.sources import SourceCount, count_sources
 from ..opendrive.objects import TUNNEL, PlacedObject, PlacedSignal, extent_in_plan
 from .clearing import clear
 from .described_parts import described_parts
-from .description import (
-    MAX_COVERED,
-    PLACED_FIELDS,
-    Area,
-    Building,
-    PlacedSolid,
-    Poles,
-    SideWay,
-    SiteDescription,
-    Slab,
-    Trees,
-    Wall,
-)
+from .description import MAX_COVERED, PLACED_FIELDS, SiteDescription
 from .intersections import ring_roads
 from .levels import MIN_LEVEL_HEIGHT, UNNAMED_ROAD, Levels
-from .map_furniture import (
-    CROWN_SHARE,
-    is_trunk,
-    landings,
-    object_parts,
-)
+from .map_furniture import CROWN_SHARE, is_trunk, landings, object_parts
 from .named_places import area_in_plan, named_places, street_names
 from .object_kinds import Kind, kind_of
 from .parts import Part
@@ -67,9 +50,6 @@ from .terrain import Relief
 STEPS = ("place", "ground", "objects", "carriageway", "pavements", "verge", "checks")
 """Steps of `street_model` in their order."""
 UNNAMED_STREET = "Unnamed street"
-
-
-_Item = TypeVar("_Item", Area, Building, KeepOffArea, PlacedSolid, Poles, SideWay, Slab, Trees, Wall)
 
 
 @dataclass(frozen=True, eq=False)
@@ -215,7 +195,7 @@ def _local_description(description: SiteDescription, origin: Float) -> SiteDescr
     return replace(description, **local)
 
 
-def _local(item: _Item, origin: Float) -> _Item:
+def _local(item: Any, origin: Float) -> Any:  # noqa: ANN401  # of any dataclass in a description
     """Return an object or area of a description in local axes: all that is a shape or an array of places in it."""
     moved: dict[str, Any] = {}
     for name, value in vars(item).items():

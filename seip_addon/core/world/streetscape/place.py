@@ -19,14 +19,7 @@ from ..opendrive.road_map import Junction, RoadMap
 from . import road_surface
 from .approaches import approach_lanes
 from .description import DEFAULT_RADIUS, SiteDescription
-from .intersections import (
-    JUNCTION_REACH,
-    box_along,
-    intersection,
-    leads_between,
-    ring_roads,
-    with_other_carriageways,
-)
+from .intersections import JUNCTION_REACH, box_along, intersection, leads_between, ring_roads, with_other_carriageways
 from .levels import Levels, split_levels
 from .named_places import street_names
 from .street_areas import GAP as JUNCTION_GAP

@@ -13,9 +13,7 @@ from ...geometry.plan import outline, united, without
 from ..opendrive.lanes import LaneSurface
 from . import road_surface
 from .clearing import MAX_IN_LANE
-from .description import (
-    SiteDescription,
-)
+from .description import SiteDescription
 from .intersections import enclosed, ring_roads
 from .levels import MIN_LEVEL_HEIGHT, Levels
 from .place import SCENE_MARGIN, shifted

@@ -13,11 +13,7 @@ from ...geometry.solids import from_faces
 from ...site.roles import AREA_OVERLAYS, Role
 from ...site.scene_geometry import OTHER_LEVELS
 from . import road_surface
-from .description import (
-    Building,
-    PlacedSolid,
-    SiteDescription,
-)
+from .description import Building, PlacedSolid, SiteDescription
 from .lane_markings import markings, stop_lines
 from .parts import Part
 from .road_surface import SNAP_GRID, SurfaceLayers, without_crumbs
