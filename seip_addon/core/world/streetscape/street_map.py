@@ -1,4 +1,7 @@
-"""Streets of a map as surfaces: lanes, junctions, objects and signals, from OpenDRIVE or a network of SUMO."""
+"""Streets of a map as surfaces: lanes and junctions, from OpenDRIVE or a network of SUMO.
+
+Its use is shown in `tests/core/world/openstreetmap/test_network_map.py`.
+"""
 
 from collections.abc import Generator, Mapping
 from dataclasses import dataclass, replace
