@@ -19,9 +19,8 @@ from seip_addon.core.sensing.traffic.trajectories import Trajectories
 from seip_addon.core.site.scene_geometry import SceneGeometry, joined
 from seip_addon.core.sumo_programs import find_sumo
 from seip_addon.core.workflows.traffic_runs import traffic_folder
-from seip_addon.core.world.traffic_simulation.simulation import run_sumo
+from seip_addon.core.world.traffic_simulation.simulation import recorded_run, run_sumo
 from seip_addon.core.world.traffic_simulation.street_network import DRIVING, StreetNetwork, read_network
-from seip_addon.core.world.traffic_simulation.traffic_run import recorded_run
 
 MIN_ON_ROAD = 0.8  # least share of a network's lanes in the region on the scene's road, for a network of its map
 WARM_UP = 120.0  # seconds before a run begins

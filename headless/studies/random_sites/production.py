@@ -23,8 +23,7 @@ from seip_addon.core.workflows.survey import lay_out
 from seip_addon.core.workflows.survey_settings import SurveySettings
 from seip_addon.core.workflows.traffic_runs import traffic_folder
 from seip_addon.core.world.elevation.at_place import TerrainRequest
-from seip_addon.core.world.traffic_simulation.simulation import Scenario
-from seip_addon.core.world.traffic_simulation.traffic_run import simulate_run
+from seip_addon.core.world.traffic_simulation.simulation import Scenario, simulate_run
 from seip_addon.scene.blend_file import new_file, save_blend
 from seip_addon.scene.build import build_scene
 from seip_addon.scene.check import contents_of

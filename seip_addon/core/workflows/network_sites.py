@@ -21,11 +21,12 @@ from ..distinct_names import distinct_names
 from ..errors import SeipError
 from ..geometry.geo_reference import GeoReference
 from ..geometry.solids import from_faces
+from ..geometry.tangent_plane import plan_metres
 from ..limits import LATITUDE, LONGITUDE, WEIGHT, Limits
 from ..progress import Progress
 from ..site.roles import Role
 from ..storage.files import digest, read_small
-from ..world.openstreetmap.crossings import SAME_JUNCTION, metres, selected_junctions
+from ..world.openstreetmap.crossings import SAME_JUNCTION, selected_junctions
 from ..world.openstreetmap.extract import Extract, Tags, cropped, read_extract, window
 from ..world.openstreetmap.site import STREET_REACH, ExtractPlace
 from ..world.streetscape.model import SiteModel
@@ -242,7 +243,7 @@ def _faces(area: BaseGeometry, level: float) -> Float:
 def _numbered(places: Sequence[tuple[str, float, float, float, Path]], approaches: float) -> tuple[NetworkPlace, ...]:
     """Return places with unique folders, and their neighbours."""
     origin = places[0][1:3]
-    plane = metres([(latitude, longitude) for _, latitude, longitude, _, _ in places], origin)
+    plane = plan_metres([(latitude, longitude) for _, latitude, longitude, _, _ in places], origin)
     tree = shapely.STRtree(shapely.points(plane))
     folders = distinct_names(_folder_name(place[0]) for place in places)
     found = []
@@ -304,7 +305,7 @@ def _number(path: Path, line: int, name: str, row: Mapping[str, str], limits: Li
 
 def _check_apart(path: Path, lines: Sequence[int], places: Sequence[tuple[str, float, float, float, Path]]) -> None:
     """Raise SeipError if two rows are the same site."""
-    plane = metres([one[1:3] for one in places], places[0][1:3])
+    plane = plan_metres([one[1:3] for one in places], places[0][1:3])
     points = shapely.points(plane)
     one, other = shapely.STRtree(points).query(points, "dwithin", distance=SAME_JUNCTION)
     same = next(((a, b) for a, b in zip(one.tolist(), other.tolist(), strict=True) if a < b), None)

@@ -19,7 +19,6 @@ from ..storage.files import whole_file
 from ..world.elevation.at_place import MapSurroundings, TerrainRequest, with_terrain
 from ..world.elevation.obstacles import Merging
 from ..world.opendrive.junctions import STREETS
-from ..world.opendrive.lanes import lane_surfaces
 from ..world.opendrive.read import read_map
 from ..world.opendrive.road_map import RoadMap
 from ..world.openstreetmap.network_map import credited
@@ -45,31 +44,19 @@ DOWNLOAD_MARGIN = 200.0  # metres beyond the streets that are laid out: `site_of
 
 
 @dataclass(frozen=True)
-class SiteRequest:
-    """Options of building a site, in addition to the file that it is built from.
+class SiteRequest(ExtractPlace):
+    """Options of building a site, in addition to the file that it is built from and to the place in an extract.
 
     Parameters
     ----------
     near : (x, y) or None
         Centre of the site: map coordinates in metres.
-    near_latlon : (latitude, longitude) or None, degrees
-        Centre of the site as latitude and longitude.
-    junction : tuple of str
-        Id or name of the junction at the centre, or the names of two streets that meet there.
-    radius, approaches : float or None, metres
-        Extent of the site, as in a `SiteDescription`.
-    level : tuple of str
-        Roads of the level, as in a `SiteDescription`.
     site : Path or None
         Site description for a map.
     osm : Path or None
         Extract whose buildings, trees and posts are added to an OpenDRIVE map.
     terrain : TerrainRequest or None
         Elevation model or laser survey that gives the ground its heights.
-    service : bool
-        Whether driveways and aisles of an extract are streets.
-    left_hand : bool or None
-        Whether traffic of an extract keeps left; None to take it from the extract.
     anywhere : bool
         Whether to use the centre of a map if no position is given.
     sumo : tuple of Path
@@ -79,34 +66,14 @@ class SiteRequest:
     """
 
     near: tuple[float, float] | None = None
-    near_latlon: tuple[float, float] | None = None
-    junction: tuple[str, ...] = ()
-    radius: float | None = None
-    approaches: float | None = None
-    level: tuple[str, ...] = ()
     site: Path | None = None
     osm: Path | None = setting(
         None, "OpenStreetMap extract with buildings, trees and posts for a map", metavar="EXTRACT"
     )
     terrain: TerrainRequest | None = None
-    service: bool = False
-    left_hand: bool | None = None
     anywhere: bool = False
     sumo: tuple[Path, ...] = ()
     overpass: OverpassServer | None = None
-
-    @property
-    def extract_place(self) -> ExtractPlace:
-        """The place that is studied, in an extract."""
-        return ExtractPlace(
-            near=self.near_latlon,
-            streets=self.junction,
-            radius=self.radius,
-            approaches=self.approaches,
-            service=self.service,
-            left_hand=self.left_hand,
-            level=self.level,
-        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,12 +120,11 @@ def build_site(
     if is_extract(source):
         return (yield from _of_extract(source, request, map_path))
     map_path, road_map, description = _of_map(source, request)
+    streets = yield from opendrive_streets(road_map)
     notes: tuple[str, ...] = ()
     if request.osm is not None:
-        lanes = [lane for road in road_map.roads for lane in lane_surfaces(road)]
-        middle, reach = _where(StreetMap(road_map, tuple(lanes)), description)
-        description, notes = yield from surroundings_of_map(request.osm, road_map, description, middle, reach)
-    streets = yield from opendrive_streets(road_map)
+        where = _where(streets, description)
+        description, notes = yield from surroundings_of_map(request.osm, streets, description, *where)
     description, more, merging = yield from _with_terrain(streets, description, request)
     model = yield from street_model(streets, description)
     return BuiltSite(map_path.name, replace(model, notes=(*notes, *more, *model.notes)), None, merging, map_path)
@@ -183,7 +149,7 @@ def site_source(request: SiteRequest, source: Path | None = None) -> Generator[P
         if source is None:
             raise SeipError("no map is named: give a map or an extract, or --at LAT,LON to download one")
         return source
-    reach = max(request.extract_place.reach, 0.0) + STREET_REACH + DOWNLOAD_MARGIN
+    reach = max(request.reach, 0.0) + STREET_REACH + DOWNLOAD_MARGIN
     if source is not None and not is_outgrown(source, near, reach):
         return source
     return (yield from download_extract(near, reach, request.overpass))
@@ -209,11 +175,9 @@ def _write_map(text: str, path: Path) -> None:
 def _of_extract(source: Path, request: SiteRequest, map_path: Path | None) -> Generator[Progress, None, BuiltSite]:
     if request.near is not None or request.osm is not None:
         raise SeipError(f"{source.name} is an extract of OpenStreetMap: give its position by --near-latlon LAT LON")
-    if len(request.junction) == 1:
-        raise SeipError(f'a junction of {source.name} needs two streets: give --junction "One Street" "Other Street"')
     with tempfile.TemporaryDirectory() as folder:
         network = Path(folder) / "streets.net.xml"
-        site = yield from site_of_extract(source, request.extract_place, network, request.sumo)
+        site = yield from site_of_extract(source, request, network, request.sumo)
     found = site.description
     _, described = describe_place(source, site=request.site)
     description = replace(
@@ -225,17 +189,17 @@ def _of_extract(source: Path, request: SiteRequest, map_path: Path | None) -> Ge
         name=described.name or found.name,
         level=request.level,
     )
-    description, more, merging = yield from _with_terrain(site.streets, description, request)
+    description, more, merging = yield from _with_terrain(site.network.streets, description, request)
     yield Progress(0, 0, "heights of streets")
     site = replace(site, description=description).on_ground()
     try:
-        model = yield from street_model(site.streets, site.description)
+        model = yield from street_model(site.network.streets, site.description)
     except UnclearLevelError as error:
         if map_path is None:
             raise
-        _write_map(credited(site.text, site.description.attribution), map_path)
+        _write_map(credited(site.network.text, site.description.attribution), map_path)
         raise UnclearLevelError(f"{error}; {map_path} is written: the map of the streets there") from error
-    map_text = credited(site.text, model.attribution)
+    map_text = credited(site.network.text, model.attribution)
     return BuiltSite(source.name, replace(model, notes=(*site.notes, *more, *model.notes)), map_text, merging)
 
 

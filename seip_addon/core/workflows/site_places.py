@@ -7,18 +7,14 @@ from pathlib import Path
 from ..distinct_names import distinct_names
 from ..progress import Progress
 from ..world.opendrive.junctions import STREETS, streets_of_junctions
-from ..world.opendrive.lanes import LaneSurface, lane_surfaces
 from ..world.opendrive.read import read_map
-from ..world.opendrive.street_plan import street_plan as plan_of_map
 from ..world.openstreetmap.crossings import Crossing, named_crossings
 from ..world.openstreetmap.extract import read_extract
 from ..world.openstreetmap.site import is_extract
-from ..world.openstreetmap.street_plan import street_plan as plan_of_extract
-from ..world.street_plan import StreetPlan
+from ..world.street_plan import StreetPlan, plan_of_extract, plan_of_map
 from ..world.streetscape.description import DEFAULT_RADIUS
 from ..world.streetscape.site_file import describe_place
-
-ROADS_PER_STEP = 20
+from ..world.streetscape.street_map import opendrive_streets
 
 
 @dataclass(frozen=True)
@@ -73,11 +69,7 @@ def site_places(source: Path) -> Generator[Progress, None, SitePlaces]:
         return SitePlaces(DEFAULT_RADIUS, places, plan_of_extract(extract, crossings))
     map_path, description = describe_place(source)
     road_map = read_map(map_path)
-    lanes: list[LaneSurface] = []
-    for number, road in enumerate(road_map.roads):
-        if number % ROADS_PER_STEP == 0:
-            yield Progress(number, len(road_map.roads), "junctions")
-        lanes += lane_surfaces(road)
+    lanes = (yield from opendrive_streets(road_map)).lanes
     meeting = streets_of_junctions(road_map, lanes)
     junctions = road_map.junctions_with_roads()
     streets = {one.id: STREETS.join(meeting.get(one.id, ())) for one in junctions}

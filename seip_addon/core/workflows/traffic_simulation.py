@@ -18,8 +18,7 @@ from ..settings import setting
 from ..site.scene_geometry import SceneGeometry
 from ..storage.files import content_fault, locked_file, parse_json, read_small, save_json, unfinished_name
 from ..world.traffic_simulation.demand import Demand
-from ..world.traffic_simulation.simulation import Scenario, SignalPlan
-from ..world.traffic_simulation.traffic_run import SimulatedRun, simulate_run
+from ..world.traffic_simulation.simulation import Scenario, SignalPlan, SimulatedRun, simulate_run
 from .traffic_runs import runs_in
 
 SIMULATION = "simulation.json"

@@ -1,15 +1,24 @@
-"""Plan of the streets of a map, on which a user chooses a junction."""
+"""Plan of the streets of a map or an extract, on which a user chooses a junction."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections import Counter, defaultdict
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import shapely
 
 from ..arrays import Float, Integer
+from ..geometry.tangent_plane import plan_metres
+from .opendrive.lanes import LaneSurface
+from .opendrive.road_map import Junction, RoadMap
+from .openstreetmap.crossings import Crossing
+from .openstreetmap.extract import Extract
+from .openstreetmap.streets import importance, is_street
 
 LABEL_SPACING = 150.0  # metres between places along a street at which its name may stand
 CHORD = 30.0  # metres to each side of such a place that its direction is taken from
+STEP = 5.0  # metres between two points of the line of a road
+MAIN_LANES = 4  # driving lanes from which a road is a main street
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,7 +87,80 @@ class StreetPlan:
     attribution: str
 
 
-def name_places(named: Mapping[str, Sequence[PlanStreet]]) -> NamePlaces:
+def plan_of_extract(extract: Extract, crossings: Sequence[Crossing]) -> StreetPlan:
+    """Return the streets of an extract in plan, with the given crossings in their order.
+
+    Within 10 km of the middle, distances are right to 0.2 %.
+    """
+    streets = [way for way in extract.ways.values() if is_street(way.tags)]
+    degrees = [
+        np.array([(node.latitude, node.longitude) for node in extract.line(way)], dtype=np.float64).reshape(-1, 2)
+        for way in streets
+    ]
+    at = np.array([(one.latitude, one.longitude) for one in crossings], dtype=np.float64).reshape(-1, 2)
+    bounds = at if len(at) else np.concatenate([at, *degrees])
+    middle = _middle(bounds) if len(bounds) else np.zeros(2)
+    drawn = (
+        (PlanStreet(plan_metres(line, middle), importance(way.tags)), way.tags.get("name", ""))
+        for way, line in zip(streets, degrees, strict=True)
+        if len(line) > 1  # otherwise the extract has at most one of its nodes
+    )
+    return _plan(drawn, plan_metres(at, middle), [one.importance for one in crossings], extract.attribution)
+
+
+def plan_of_map(road_map: RoadMap, lanes: Sequence[LaneSurface], junctions: Sequence[Junction]) -> StreetPlan:
+    """Return the roads of an OpenDRIVE map in plan, with the given junctions in their order.
+
+    Parameters
+    ----------
+    lanes : sequence of LaneSurface
+        Lanes of all roads of the map.
+    junctions : sequence of Junction
+        Junctions with roads.
+    """
+    stations = (np.linspace(0.0, road.length, 2 + int(road.length / STEP)) for road in road_map.roads)
+    lines = [road.frame(along).origin[:, :2] for road, along in zip(road_map.roads, stations, strict=True)]
+    within = defaultdict(list)
+    for road, line in zip(road_map.roads, lines, strict=True):
+        within[road.junction_id].append(line)
+    at = np.array([_middle(np.concatenate(within[one.id])) for one in junctions]).reshape(-1, 2)
+    middle = _middle(at if len(at) else np.concatenate(lines))
+    driving = {(lane.road_id, lane.lane_id) for lane in lanes if lane.lane_type == "driving"}
+    width = Counter(road for road, _ in driving)
+    arms = Counter(
+        link.id
+        for road in road_map.roads
+        for link in (road.predecessor, road.successor)
+        if road.junction_id is None and link is not None and link.kind == "junction"
+    )
+    drawn = (
+        (
+            PlanStreet(line - middle, 2 if width[road.id] >= MAIN_LANES else int(width[road.id] > 1)),
+            road.name if road.junction_id is None else "",
+        )
+        for road, line in zip(road_map.roads, lines, strict=True)
+    )
+    return _plan(drawn, at - middle, [min(2, max(0, arms[one.id] - 2)) for one in junctions], "")
+
+
+def _plan(
+    drawn: Iterable[tuple[PlanStreet, str]], junctions: Float, importance: Sequence[int], attribution: str
+) -> StreetPlan:
+    """Return a plan of streets with their names, "" for none, and of junctions (n, 2) with the importance of each."""
+    streets, named = [], defaultdict(list)
+    for street, name in drawn:
+        streets.append(street)
+        if name:
+            named[name].append(street)
+    return StreetPlan(tuple(streets), junctions, np.array(importance, dtype=np.int64), _name_places(named), attribution)
+
+
+def _middle(points: Float) -> Float:
+    middle: Float = (points.min(axis=0) + points.max(axis=0)) / 2.0
+    return middle
+
+
+def _name_places(named: Mapping[str, Sequence[PlanStreet]]) -> NamePlaces:
     """Return places for the names of streets; pieces that continue each other are one."""
     names = tuple(sorted(named))
     rows = [(number, *place) for number, name in enumerate(names) for place in _places_along(named[name])]

@@ -12,7 +12,7 @@ from seip_addon.core.sensing.traffic.trajectories import Trajectories
 from seip_addon.core.workflows import traffic_simulation
 from seip_addon.core.workflows.traffic_simulation import SIMULATION, SimulationSettings, simulate_runs
 from seip_addon.core.world.traffic_simulation.demand import Demand
-from seip_addon.core.world.traffic_simulation.traffic_run import SimulatedRun
+from seip_addon.core.world.traffic_simulation.simulation import SimulatedRun
 from tests.builders.small_scene import make_run
 
 

@@ -8,11 +8,10 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...arrays import Boolean, Float, Integer
 from ...geometry.height_raster import HeightRaster
-from ...geometry.solids import Solid, join
+from ...geometry.solids import Solid, block, join
 
 MIN_ABOVE = 2.0  # metres above the ground: lower points are ignored, because road users are there
 UNCLASSIFIED, VEGETATION, BUILDING = (0, 1), (3, 4, 5), (6,)
@@ -97,7 +96,9 @@ def obstacle_raster(ground: HeightRaster, points: Float, classes: Integer) -> Ob
     for number in (1, 0, 2):  # vegetation first, as anything more solid blocks the view down to the ground
         of_kind.ravel()[cell[kind == number]] = number
     top, low = top.reshape(shape), low.reshape(shape)
-    of_kind[_neighbours(of_kind >= 0) < 2] = -1
+    stands = np.pad(of_kind >= 0, 1)
+    around = np.lib.stride_tricks.sliding_window_view(stands, (3, 3)).sum(axis=(2, 3)) - stands[1:-1, 1:-1]
+    of_kind[around < 2] = -1  # at most one of the eight cells around has an object
     raised = (of_kind == 1) & (low - ground.heights > CROWN_BASE)
     return ObstacleRaster(ground, of_kind, np.where(raised, low, ground.heights - FOUNDATION), top)
 
@@ -201,22 +202,8 @@ def solids(raster: ObstacleRaster, boxes: Sequence[Box]) -> Iterator[tuple[str, 
             for column, row in zip(box.columns, box.rows, strict=True)
         )
         side, cap = MATERIALS[box.kind]
-        corners = np.array(
-            [[a, b, z] for z in (box.low, box.top) for a, b in ((x, y), (far_x, y), (far_x, far_y), (x, far_y))]
-        )
-        key = (box.kind, int(x // TILE), int(y // TILE))
-        tiles.setdefault(key, []).append(Solid(corners, _BOX, (*[side] * 4, cap, side)))
+        base = np.array([[a, b, box.low] for a, b in ((x, y), (far_x, y), (far_x, far_y), (x, far_y))])
+        solid = block(base, np.full(4, box.top - box.low), side=side, cap=cap)
+        tiles.setdefault((box.kind, int(x // TILE), int(y // TILE)), []).append(solid)
     for (kind, _, _), found in sorted(tiles.items()):
         yield KINDS[kind], join(*found)
-
-
-_BOX = ((0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7), (4, 5, 6, 7), (3, 2, 1, 0))
-
-
-def _neighbours(there: Boolean) -> NDArray[np.int64]:
-    """Return the number of occupied cells among the eight around each cell."""
-    padded = np.pad(there.astype(np.int64), 1)
-    rows, columns = there.shape
-    around = [padded[i : i + rows, j : j + columns] for i in range(3) for j in range(3) if (i, j) != (1, 1)]
-    total: NDArray[np.int64] = np.sum(around, axis=0)
-    return total

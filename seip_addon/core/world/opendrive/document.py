@@ -14,6 +14,7 @@ from defusedxml.ElementTree import ParseError, fromstring
 
 from ...errors import SeipError
 from ...limits import MAP_NUMBER
+from ..other_formats import other_format
 
 if TYPE_CHECKING:
     from xml.etree.ElementTree import Element
@@ -109,27 +110,6 @@ class Node:
         return self.text(name, str(default)).lower() in ("true", "yes", "1")
 
 
-_OTHER_FILE_STARTS = {
-    b"\x1f\x8b": "is compressed with gzip; unpack it (gunzip)",
-    b"PK\x03\x04": "is a zip archive; unpack it",
-    b"BZh": "is compressed with bzip2; unpack it (bunzip2)",
-    b"\xfd7zXZ": "is compressed with xz; unpack it (unxz)",
-    b"BLENDER": "is a .blend file, not a map; open it in Blender",
-}
-"""First bytes of other formats that are given in place of a map, and what to do with such a file."""
-
-
-def _refuse_other_formats(path: str | os.PathLike[str], name: str) -> None:
-    with open(path, "rb") as file:  # noqa: PTH123 - as above
-        start = file.read(1000)
-    for mark, cure in _OTHER_FILE_STARTS.items():
-        if start.startswith(mark):
-            raise SeipError(f"{name} {cure}")
-    if start.lstrip(b"\xef\xbb\xbf \t\r\n")[:1] in (b"{", b"["):
-        kind = "CityJSON, a model of buildings" if b'"CityJSON"' in start else "JSON"
-        raise SeipError(f"{name} is {kind}, not OpenDRIVE: choose an .xodr file")
-
-
 def read_document(path: str | os.PathLike[str]) -> Node:
     """Parse an XML file and return its root.
 
@@ -141,7 +121,9 @@ def read_document(path: str | os.PathLike[str]) -> Node:
     """
     name = os.path.basename(os.fspath(path))  # noqa: PTH119 - works for any path-like, existing or not
     try:
-        _refuse_other_formats(path, name)
+        with open(path, "rb") as file:  # noqa: PTH123 - as above
+            if other := other_format(file.read(1000), "OpenDRIVE: choose an .xodr file"):
+                raise SeipError(f"{name} {other}")
         if (size := os.stat(path).st_size) > _MAX_BYTES:  # noqa: PTH116 - as above
             raise SeipError(f"{name} has {size / 1e9:.1f} GB, more than a map of a city; cut the place out of it")
         content = Path(path).read_bytes()

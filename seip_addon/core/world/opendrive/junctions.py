@@ -78,16 +78,15 @@ def _no_lanes(road_map: RoadMap, junction: Junction, called: str) -> SeipError:
 
 def streets_of_junctions(road_map: RoadMap, surfaces: Iterable[LaneSurface]) -> dict[str, tuple[str, ...]]:
     """Return the names of the streets that meet at each junction, by its id, in the order of the file."""
-    names = {road.id: road.name for road in road_map.roads if road.name}
     areas: dict[str, list[BaseGeometry]] = {}
     ends, of_end = [], []
     for surface in surfaces:
         if surface.junction_id is not None:
             areas.setdefault(surface.junction_id, []).append(surface.polygon)
-        elif surface.road_id in names:
+        elif name := road_map.names.get(surface.road_id, ""):
             for row in (0, -1):
                 ends.append(Point((surface.left[row, :2] + surface.right[row, :2]) / 2))
-                of_end.append(names[surface.road_id])
+                of_end.append(name)
     tree = shapely.STRtree(ends)
     found = {}
     for number, parts in areas.items():

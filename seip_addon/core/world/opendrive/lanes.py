@@ -12,7 +12,7 @@ from shapely.geometry.base import BaseGeometry
 from ...arrays import Float
 from ...errors import SeipError
 from ...limits import ELEVATION
-from .road_map import Lane, LaneSection, Road, RoadFrame
+from .road_map import Lane, LaneSection, Road, RoadFrame, lifted
 from .sampling import sample
 
 _MIN_TRIANGLE_AREA = 1e-9  # square metres
@@ -169,7 +169,7 @@ def _side_edges(
             step = (side * width)[:, None] * frame.level_left
         else:
             step = (outer_t - t)[:, None] * frame.left + (rise(outer_t) - rise(t))[:, None] * frame.up
-        yield _raised(point, lane.inner_height(s)), _raised(point + step, lane.outer_height(s))
+        yield lifted(point, lane.inner_height(s)), lifted(point + step, lane.outer_height(s))
         point, t = point + step, outer_t
 
 
@@ -179,10 +179,3 @@ def _width(lane: Lane, s: Float, inner: Float) -> Float:
         return np.maximum(lane.width(s), 0.0)
     # Some exporters give the borders of right lanes as t, some as distances: the side is known anyway.
     return np.maximum(np.abs(lane.border(s)) - inner, 0.0)
-
-
-def _raised(points: Float, height: Float) -> Float:
-    """Return points lifted straight up, so that a kerb leaves no gap in plan."""
-    raised = points.copy()
-    raised[:, 2] += height
-    return raised

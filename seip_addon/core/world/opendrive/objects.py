@@ -1,6 +1,6 @@
 """Objects and signals of a map in map coordinates; `tests/core/world/opendrive/test_opendrive_objects.py` has some."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from shapely import MultiPoint
@@ -43,8 +43,8 @@ class PlacedObject:
         Type in lower case, such as ``building`` or ``tree``.
     position : (3,) float64, metres
         Origin in map coordinates.
-    yaw, pitch, roll : float, radians
-        Rotations about z, then y, then x; yaw counter-clockwise from +x.
+    yaw : float, radians
+        Rotation about the vertical, counter-clockwise from +x; its outlines also have the file's pitch and roll.
     length, width, height, radius : float, metres
         Size of its box or cylinder, zero if the file does not give it.
     outlines : tuple of Outline
@@ -58,29 +58,28 @@ class PlacedObject:
     kind: str
     position: Float
     yaw: float
-    pitch: float
-    roll: float
-    length: float
-    width: float
-    height: float
-    radius: float
-    outlines: tuple[Outline, ...]
+    length: float = 0.0
+    width: float = 0.0
+    height: float = 0.0
+    radius: float = 0.0
+    outlines: tuple[Outline, ...] = ()
+
+    def moved(self, by: Float) -> "PlacedObject":
+        """Return the object moved by a vector (3,), metres."""
+        outlines = tuple(replace(outline, base=outline.base + by) for outline in self.outlines)
+        return replace(self, position=self.position + by, outlines=outlines)
 
 
 @dataclass(frozen=True, eq=False)
 class PlacedSignal:
-    """A signal in map coordinates.
-
-    Depending on the map this is the foot of the post or the lamp above the carriageway.
+    """A traffic light in map coordinates: depending on the map the foot of its post, or the lamp above the carriageway.
 
     Parameters
     ----------
     road_id : str
         Road that it applies to.
-    id, name, kind : str
-        Id, name and type as in the file.
-    dynamic : bool
-        Whether it changes, as a traffic light does.
+    name : str
+        Name as in the file.
     position : (3,) float64, metres
         Position in map coordinates.
     yaw : float, radians
@@ -89,10 +88,7 @@ class PlacedSignal:
     """
 
     road_id: str
-    id: str
     name: str
-    kind: str
-    dynamic: bool
     position: Float
     yaw: float
 

@@ -74,6 +74,13 @@ def profile(records: list[tuple[float, tuple[float, float, float, float]]]) -> P
     )
 
 
+def linear_profile(start: Float, values: Float) -> Profile:
+    """Return the profile that is linear between values (n,) at stations (n,) in metres along the road."""
+    lengths = np.diff(start)
+    slopes = np.divide(np.diff(values), lengths, out=np.zeros(len(lengths)), where=lengths > 0)
+    return Profile(start[:-1], np.column_stack([values[:-1], slopes, np.zeros((len(slopes), 2))]))
+
+
 ZERO_PROFILE = profile([])  # the profile without records: zero everywhere
 
 

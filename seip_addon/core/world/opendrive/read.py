@@ -17,14 +17,7 @@ from .document import Node, read_document
 from .profile import ZERO_PROFILE, Profile, lateral_shape, profile
 from .read_objects import read_objects, read_signals
 from .reference_line import Clothoid, Cubic, Piece, ReferenceLine, param_poly3, poly3
-from .road_map import (
-    Junction,
-    Lane,
-    LaneSection,
-    Road,
-    RoadLink,
-    RoadMap,
-)
+from .road_map import Junction, Lane, LaneSection, Road, RoadLink, RoadMap
 
 _OTHER_FORMATS = {
     "osm": " as extracts of OpenStreetMap do (let its name end in .osm)",

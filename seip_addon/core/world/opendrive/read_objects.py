@@ -12,7 +12,7 @@ from ...errors import SeipError
 from ...geometry.orientation import orientation
 from .document import Node
 from .objects import TUNNEL, Outline, PlacedObject, PlacedSignal
-from .road_map import Road
+from .road_map import Road, lifted
 from .sampling import sample
 
 _MAX_COPIES = 10_000
@@ -86,15 +86,16 @@ def read_objects(road: Road, node: Node) -> Iterator[PlacedObject]:
 
 
 def read_signals(road: Road, node: Node) -> Iterator[PlacedSignal]:
-    """Yield the signals of a road."""
+    """Yield the traffic lights of a road: its signals that change."""
     for child in node.children("signals", "signal"):
+        if not child.flag("dynamic"):
+            continue
         item = child.within(f"signal {child.text('id', '')}")
         s = np.array([item.number("s")])
         position = _point(road, float(s[0]), item.number("t"), item.number("zOffset", 0.0))
         turned = math.pi if item.text("orientation", "none") == "-" else 0.0
         yaw = float(road.frame(s).heading[0]) + turned + item.number("hOffset", 0.0)
-        number, name, kind = (item.text(key, "") for key in ("id", "name", "type"))
-        yield PlacedSignal(road.id, number, name, kind, dynamic=item.flag("dynamic"), position=position, yaw=yaw)
+        yield PlacedSignal(road.id, item.text("name", ""), position, yaw)
 
 
 def _tunnel(road: Road, node: Node) -> PlacedObject:
@@ -103,7 +104,7 @@ def _tunnel(road: Road, node: Node) -> PlacedObject:
     along = np.linspace(start, stop, 2 + int((stop - start) / TUNNEL_STEP))
     line = Outline(road.place(along, np.zeros(len(along))), np.zeros(len(along)), closed=False)
     names = road.id, node.text("id", ""), node.text("name", ""), TUNNEL
-    return PlacedObject(*names, line.base.mean(axis=0), 0.0, 0.0, 0.0, float(stop - start), 0.0, 0.0, 0.0, (line,))
+    return PlacedObject(*names, line.base.mean(axis=0), 0.0, length=float(stop - start), outlines=(line,))
 
 
 def _object(road: Road, node: Node) -> _Object:
@@ -190,8 +191,6 @@ def _placed(item: _Object, copy: _Copy) -> PlacedObject:
         kind=node.text("type", "none").lower(),
         position=position,
         yaw=yaw,
-        pitch=item.pitch,
-        roll=item.roll,
         length=copy.length,
         width=copy.width,
         height=copy.height,
@@ -211,7 +210,7 @@ def _strip(item: _Object, ends: Float) -> PlacedObject:
     def lines(s: Float) -> Float:
         """Return the left and right edge at the foot, and the height of the top above it as a third line."""
         t_here, half, up_here, top = (np.interp(s, ends[:, 0], pair) for pair in (t, width / 2.0, up, height))
-        left, right = (_lifted(road.place(s, t_here + sign * half), up_here) for sign in (1.0, -1.0))
+        left, right = (lifted(road.place(s, t_here + sign * half), up_here) for sign in (1.0, -1.0))
         return np.stack([left, right, np.column_stack([np.zeros((len(s), 2)), top])], axis=1)
 
     starts = np.concatenate([road.reference_line.s, road.elevation.start, road.superelevation.start])
@@ -230,9 +229,4 @@ def _strip(item: _Object, ends: Float) -> PlacedObject:
 
 def _point(road: Road, s: float, t: float, up: float) -> Float:
     """Return the point (3,) at a height (metres) vertically above a place of the road."""
-    return np.asarray(_lifted(road.place(np.array([s]), np.array([t])), np.array([up]))[0])
-
-
-def _lifted(points: Float, height: Float) -> Float:
-    """Return points (k, 3) lifted straight up by (k,) metres."""
-    return np.asarray(points + height[:, None] * np.array([0.0, 0.0, 1.0]))
+    return np.asarray(lifted(road.place(np.array([s]), np.array([t])), np.array([up]))[0])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -128,6 +129,11 @@ class Road:
         return frame.origin + t[:, None] * frame.left
 
 
+def lifted(points: Float, height: Float) -> Float:
+    """Return points (k, 3) lifted straight up by (k,) metres, so that they stay where they are in plan."""
+    return np.asarray(points + height[:, None] * np.array([0.0, 0.0, 1.0]))
+
+
 @dataclass(frozen=True, eq=False)
 class RoadFrame:
     """Moving axes of a road at k stations.
@@ -190,7 +196,7 @@ class RoadMap:
     objects : tuple of PlacedObject
         Objects, with repeated ones as often as they are repeated.
     signals : tuple of PlacedSignal
-        Signals.
+        Traffic lights.
     attribution : tuple of str
         Credits in the header's ``<userData code="attribution">``.
 
@@ -218,6 +224,11 @@ class RoadMap:
     objects: tuple[PlacedObject, ...] = ()
     signals: tuple[PlacedSignal, ...] = ()
     attribution: tuple[str, ...] = ()
+
+    @cached_property
+    def names(self) -> dict[str, str]:
+        """Names of the streets by the ids of their roads, "" for roads without one."""
+        return {road.id: road.name for road in self.roads}
 
     def junctions_with_roads(self) -> tuple[Junction, ...]:
         """Return the junctions that have roads, in the order of the file."""

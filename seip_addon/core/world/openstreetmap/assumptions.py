@@ -26,7 +26,7 @@ def lone_signals(nodes: Sequence[Node]) -> Iterator[str]:
 def _names(ways: Iterable[Way]) -> str:
     """Return the names of streets for a note, in alphabetical order."""
     unnamed = "streets without a name"
-    names = {{**way.tags, **shown_name(way.tags)}.get("name", unnamed) for way in ways}
+    names = {shown_name(way.tags) or unnamed for way in ways}
     known = sorted(names, key=lambda name: (name == unnamed, name))
     return ", ".join(known[:MAX_NAMED]) + (f" and {len(known) - MAX_NAMED} more" * (len(known) > MAX_NAMED))
 
@@ -61,7 +61,7 @@ def implausible_lane_notes(ways: Iterable[Way]) -> Iterator[str]:
     for way in ways:
         given = implausible_lanes(way.tags) if "highway" in way.tags else {}
         if given:
-            name = {**way.tags, **shown_name(way.tags)}.get("name") or UNNAMED_ROAD
+            name = shown_name(way.tags) or UNNAMED_ROAD
             values = ", ".join(
                 f"{key}={value[:MAX_SHOWN]}{'…' * (len(value) > MAX_SHOWN)}" for key, value in given.items()
             )

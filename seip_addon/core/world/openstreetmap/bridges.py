@@ -1,5 +1,6 @@
 """Grade-separated crossings of an extract: streets on bridges and in underpasses, with the clearance required."""
 
+import itertools
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -9,7 +10,8 @@ from shapely.geometry.base import BaseGeometry
 
 from ...arrays import Float
 from .extract import Extract, Tags, Way
-from .quantities import count, metres
+from .quantities import metres
+from .street_lanes import lane_widths
 
 DECK = 1.0
 """Thickness (metres) of a bridge's deck, with its bearings."""
@@ -20,7 +22,7 @@ HEADROOMS = {
 """Clear height (metres) above ways that are not roads; roads and trams have `ROAD_HEADROOM`."""
 ROAD_HEADROOM = 4.5
 MAX_LAYER = 5
-LANE_WIDTH, KERBSIDE, NARROW = 3.5, 2.0, 4.0  # metres: a lane, the strip next to the lanes, a way that is not a road
+KERBSIDE, NARROW = 2.0, 4.0  # metres: the strip next to the lanes of a road, a way that is not a road
 _SHARED = 0.5  # metres around a node of both ways within which they meet, not cross
 _NO_ROAD = {"construction", "proposed", "abandoned", "razed", "platform", "elevator", "services", "rest_area"}
 
@@ -163,17 +165,11 @@ def _headroom(tags: Tags) -> float | None:
     return HEADROOMS.get(highway, ROAD_HEADROOM)
 
 
-def half_width(tags: Tags, lanes: int) -> float:
-    """Return half the width of a way with a number of lanes, metres; `lanes` is 0 for ways that are not roads."""
-    width = metres(tags.get("width"), 60.0) or (LANE_WIDTH * lanes if lanes else NARROW)
-    return width / 2 + (KERBSIDE if lanes else 0.0)
-
-
-def lanes_of(tags: Tags) -> int:
-    """Return the approximate number of lanes of a way, 0 if it is not a road."""
+def half_width(tags: Tags) -> float:
+    """Return half the width of a way, metres: for a road that of its lanes, with a strip next to them."""
     if tags.get("highway") is None or tags["highway"] in HEADROOMS:
-        return 0
-    return int(count(tags.get("lanes"), 12) or (1 if tags.get("oneway") == "yes" else 2))
+        return (metres(tags.get("width"), 60.0) or NARROW) / 2
+    return sum(itertools.chain(*lane_widths(tags).values())) / 2 + KERBSIDE
 
 
 def _where(line: Float, other: Float) -> BaseGeometry:
@@ -201,7 +197,7 @@ def corridors(crossing: Crossing, street: Float, other: Float) -> Iterator[tuple
     street, other : (n, 2) float64, metres
         Lines of the two ways.
     """
-    halves = [half_width(way.tags, lanes_of(way.tags)) for way in (crossing.way, crossing.other)]
+    halves = [half_width(way.tags) for way in (crossing.way, crossing.other)]
     lines = [shapely.LineString(line) for line in (street, other)]
     areas = [line.buffer(half, cap_style="flat") for line, half in zip(lines, halves, strict=True)]
     common = _where(street, other)

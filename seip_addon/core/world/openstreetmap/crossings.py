@@ -1,7 +1,7 @@
 """Crossings of named streets in an extract, and those that a rule selects as the sites of a network."""
 
 from collections import defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -75,18 +75,21 @@ def named_crossings(extract: Extract) -> tuple[Crossing, ...]:
             pair = tuple(sorted(streets_there))
             places[pair].append(middle)
             importances[pair] = max(importances[pair], sorted(streets_there.values())[-2])
-    found = [Crossing(pair, *middle, importances[pair]) for pair, there in places.items() for middle in _apart(there)]
+    found = [
+        Crossing(pair, float(group[:, 0].mean()), float(group[:, 1].mean()), importances[pair])
+        for pair, there in places.items()
+        for group in clustered(there, ONE_CROSSING)
+    ]
     return tuple(sorted(found, key=lambda one: (one.streets, one.latitude, one.longitude)))
 
 
-def _apart(places: list[tuple[float, float]]) -> Iterator[tuple[float, float]]:
-    """Yield the centres of groups of places that lie close to each other."""
-    waiting = np.array(sorted(places))
-    while len(waiting):
-        near = np.hypot(*metres(waiting, waiting[0]).T) <= ONE_CROSSING
-        latitude, longitude = waiting[near].mean(axis=0).tolist()
-        yield latitude, longitude
-        waiting = waiting[~near]
+def clustered(places: Sequence[tuple[float, float]], distance: float) -> list[Float]:
+    """Return latitudes and longitudes in groups (n, 2) that are more than a distance in metres apart, largest first."""
+    points = shapely.points(plan_metres(places, places[0]))
+    areas = shapely.get_parts(shapely.union_all(shapely.buffer(points, distance / 2)))
+    of_group = [int(np.argmax(shapely.intersects(areas, point))) for point in points]
+    groups = [np.array(places)[np.array(of_group) == group] for group in dict.fromkeys(of_group)]
+    return sorted(groups, key=len, reverse=True)
 
 
 def selected_junctions(
@@ -117,7 +120,7 @@ def selected_junctions(
         if within is None or within.intersects(shapely.Point(one.longitude, one.latitude))
     ]
     if found:
-        places = metres([(one.latitude, one.longitude) for one in found], (found[0].latitude, found[0].longitude))
+        places = plan_metres([(one.latitude, one.longitude) for one in found], (found[0].latitude, found[0].longitude))
         selected = np.zeros(len(found), dtype=bool)
         for rule in rules:
             selected |= _selected(extract, rule, places, (found[0].latitude, found[0].longitude))
@@ -129,11 +132,6 @@ def selected_junctions(
             "road class), another area, or another extract"
         )
     return tuple(found)
-
-
-def metres(latlon: Sequence[tuple[float, float]] | Float, origin: tuple[float, float] | Float) -> Float:
-    """Return east and north, (n, 2) float64 metres, of latitudes and longitudes near an origin."""
-    return plan_metres(np.array(latlon, dtype=np.float64).reshape(-1, 2), np.array(origin))
 
 
 def _selected(extract: Extract, rule: str, places: Float, origin: tuple[float, float]) -> Boolean:
@@ -149,7 +147,7 @@ def _selected(extract: Extract, rule: str, places: Float, origin: tuple[float, f
         reach = ROUNDABOUT_REACH if rule == "roundabouts" else SAME_JUNCTION / 2
     if not nodes:
         return np.zeros(len(places), dtype=bool)
-    points = shapely.points(metres([(node.latitude, node.longitude) for node in nodes], origin))
+    points = shapely.points(plan_metres([(node.latitude, node.longitude) for node in nodes], origin))
     near = shapely.STRtree(points).query(shapely.points(places), "dwithin", distance=reach)[0]
     selected: Boolean = np.isin(np.arange(len(places)), near)
     return selected
@@ -169,7 +167,7 @@ def _merged(found: Sequence[Crossing]) -> list[Crossing]:
     kept: list[Crossing] = []
     for one in order:
         here = (one.latitude, one.longitude)
-        others = metres([(other.latitude, other.longitude) for other in kept], here)
+        others = plan_metres([(other.latitude, other.longitude) for other in kept], here)
         if not len(others) or np.hypot(*others.T).min() > SAME_JUNCTION:
             kept.append(one)
     return sorted(kept, key=lambda one: (one.streets, one.latitude, one.longitude))

@@ -3,29 +3,24 @@
 import itertools
 import math
 import re
-from collections.abc import Generator, Mapping
+from collections.abc import Generator, Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
+from ...arrays import Float
 from ...counts import counted
 from ...errors import SeipError
+from ...geometry.tangent_plane import plan_metres
 from ...progress import Progress
 from ...site.sources import one_line
 from ...storage.xml_stream import Attributes, quoted, read_tags
+from ..other_formats import GZIP, other_format
 
 MAX_ELEMENTS = 3_000_000  # nodes, ways and relations that are kept at most: about a city
 EARTH_RADIUS = 6_350_000.0  # metres: below the smallest real radius, so that windows are no smaller than requested
 MAX_LATITUDE = 85.0  # degrees: projections of streets do not hold nearer to a pole
-_OTHER_FORMATS = {
-    b"BZh": "is compressed with bzip2; unpack it (bunzip2)",
-    b"PK\x03\x04": "is a zip archive; unpack it",
-    b"\xfd7zXZ": "is compressed with xz; unpack it (unxz)",
-    b"BLENDER": "is a .blend file, not an extract; open it in Blender",
-    b"{": "is JSON; download the place as OpenStreetMap XML (.osm), from Overpass with [out:xml]",
-}
-"""First bytes of other formats that are given in place of an extract, and what to do with such a file."""
 PBF_START = b"\x00\x00\x00"
 """First bytes of the PBF format: the length of its first header, in network order."""
 PBF_STEP = 100_000  # elements of a PBF file between two reports of progress
@@ -122,6 +117,11 @@ class Extract:
     def line(self, way: Way) -> list[Node]:
         """Return the nodes of a way that the extract contains; a way that is cut off has fewer nodes than ids."""
         return [self.nodes[number] for number in way.nodes if number in self.nodes]
+
+    def in_metres(self, nodes: Iterable[Node]) -> Float:
+        """Return the positions of nodes (n, 2), metres east and north of the extract's first node."""
+        first = next(iter(self.nodes.values()))
+        return plan_metres([(node.latitude, node.longitude) for node in nodes], (first.latitude, first.longitude))
 
 
 class _Collector:
@@ -439,9 +439,7 @@ def _first_bytes(path: Path) -> bytes:
             start = file.read(1000)
     except OSError:
         return b""  # the reader names the fault
-    if b'"CityJSON"' in start:
-        raise SeipError(f"{path.name} is CityJSON, a model of buildings, not an extract: choose an .osm file")
-    for mark, cure in _OTHER_FORMATS.items():
-        if start.lstrip(b"\xef\xbb\xbf \t\r\n" if mark == b"{" else b"").startswith(mark):
-            raise SeipError(f"{path.name} {cure}")
+    other = other_format(start, "an extract: choose OpenStreetMap XML (.osm), from Overpass with [out:xml]")
+    if other and not start.startswith(GZIP):
+        raise SeipError(f"{path.name} {other}")
     return start

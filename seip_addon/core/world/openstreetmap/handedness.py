@@ -1,8 +1,8 @@
 """Left- or right-hand traffic of an extract, from its tags, its roundabouts and its location."""
 
-import itertools
 import math
-from collections.abc import Iterator
+
+import numpy as np
 
 from .extract import Extract, Way
 
@@ -52,7 +52,11 @@ def drives_on_the_left(extract: Extract) -> tuple[bool, str]:
             return side == "left", "a street has the tag driving_side"
     # Roundabouts are one-way in the order of their nodes: counter-clockwise in right-hand traffic, clockwise in
     # left-hand traffic. Angles add up over ways that are only parts of a roundabout, too.
-    turn = sum(_turn(extract, way) for way in _roundabouts(extract))
+    turn = sum(
+        _turn(extract, way)
+        for way in extract.ways.values()
+        if way.tags.get("junction") == "roundabout" and "highway" in way.tags
+    )
     if abs(turn) > _MIN_EVIDENCE * math.pi / 2:
         return turn < 0.0, "its roundabouts turn that way"
     nodes = list(extract.nodes.values())
@@ -63,22 +67,8 @@ def drives_on_the_left(extract: Extract) -> tuple[bool, str]:
     return False, "as in most countries"
 
 
-def _roundabouts(extract: Extract) -> Iterator[Way]:
-    return (way for way in extract.ways.values() if way.tags.get("junction") == "roundabout" and "highway" in way.tags)
-
-
 def _turn(extract: Extract, way: Way) -> float:
     """Return the total angle that a way turns by, radians counter-clockwise."""
-    nodes = extract.line(way)
-    if len(nodes) < 3:
-        return 0.0
-    east = math.cos(math.radians(nodes[0].latitude))
-    steps = [
-        complex((after.longitude - before.longitude) * east, after.latitude - before.latitude)
-        for before, after in itertools.pairwise(nodes)
-    ]
-    steps = [step for step in steps if step != 0]
-    return sum(
-        math.atan2((before.conjugate() * after).imag, (before.conjugate() * after).real)
-        for before, after in itertools.pairwise(steps)
-    )
+    steps = np.diff(extract.in_metres(extract.line(way)) @ [1.0, 1.0j])
+    steps = steps[steps != 0]
+    return float(np.angle(steps[1:] / steps[:-1]).sum())

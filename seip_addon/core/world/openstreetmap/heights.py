@@ -30,7 +30,7 @@ from ...arrays import Float, Integer
 from ...geometry.plan import beside, travelled
 from ..opendrive.road_map import Road, RoadMap
 from ..streetscape.street_map import Profiles
-from .bridges import Crossing, corridors, half_width, lanes_of
+from .bridges import Crossing, corridors, half_width
 from .plan_shapes import PlanShapes
 from .streets import StreetFile, is_link, joined, way_id
 
@@ -159,8 +159,7 @@ class _Graph:
 
     def half(self, way: int) -> float:
         """Return half the width of a way, metres."""
-        tags = self.streets.ways[way].tags
-        return half_width(tags, lanes_of(tags))
+        return half_width(self.streets.ways[way].tags)
 
     def cells(self, way: int) -> NDArray[np.object_]:
         """Return the area in plan around each place of a way."""
@@ -194,12 +193,10 @@ class _Graph:
         if not pieces:
             return np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64), np.empty(0)
         first, last = np.concatenate(pieces).T
-        start, step = self.xy[first], self.xy[last] - self.xy[first]
-        share = ((places[:, None] - start) * step).sum(axis=2) / np.maximum((step**2).sum(axis=1), _TOLERANCE)
-        share = np.clip(share, 0.0, 1.0)
-        away = np.linalg.norm(places[:, None] - start - share[:, :, None] * step, axis=2)
-        nearest = np.argmin(away, axis=1)
-        return first[nearest], last[nearest], share[np.arange(len(places)), nearest]
+        segments = shapely.linestrings(np.stack([self.xy[first], self.xy[last]], axis=1))
+        points = shapely.points(places)
+        nearest = shapely.STRtree(segments).nearest(points)
+        return first[nearest], last[nearest], shapely.line_locate_point(segments[nearest], points, normalized=True)
 
     def limit_turns(self, road_map: RoadMap) -> None:
         """Limit the grades of the roads within junctions, which may be shorter than the ways between their ends."""
@@ -316,28 +313,16 @@ class _Place:
     ----------
     crossing : Crossing
         Ways that cross.
-    own : (n,) int64
-        Places of the street on the bridge or in the underpass.
-    others : (m,) int64
-        Places of the crossed street; empty if the crossed way is not a street.
+    upper, lower : (n,) and (m,) int64
+        Places of the upper and of the lower street; empty for a crossed way that is not a street.
     ground : float, metres
         Height of a crossed way that is not a street.
     """
 
     crossing: Crossing
-    own: Integer
-    others: Integer
+    upper: Integer
+    lower: Integer
     ground: float
-
-    @property
-    def upper(self) -> Integer:
-        """Places of the upper street."""
-        return self.own if self.crossing.is_bridge else self.others
-
-    @property
-    def lower(self) -> Integer:
-        """Places of the lower street."""
-        return self.others if self.crossing.is_bridge else self.own
 
 
 def _crossing_places(graph: _Graph, crossings: Iterable[Crossing], shapes: PlanShapes) -> Iterator[_Place]:
@@ -356,8 +341,10 @@ def _crossing_places(graph: _Graph, crossings: Iterable[Crossing], shapes: PlanS
                 ways = {crossing.street, *graph.onward(crossing.street)}.difference(crossed)
                 middle = shapely.get_coordinates(common.centroid)
                 mine = np.concatenate([_within(graph, way, other_area, beyond=1) for way in sorted(ways)])
-                others = [np.empty(0, dtype=np.int64), *(_within(graph, way, street_area) for way in crossed)]
-                yield _Place(crossing, mine, np.concatenate(others), float(graph.ground(middle)[0]))
+                found = [np.empty(0, dtype=np.int64), *(_within(graph, way, street_area) for way in crossed)]
+                others = np.concatenate(found)
+                upper, lower = (mine, others) if crossing.is_bridge else (others, mine)
+                yield _Place(crossing, upper, lower, float(graph.ground(middle)[0]))
 
 
 def _within(graph: _Graph, way: int, area: BaseGeometry, beyond: int = 0) -> Integer:

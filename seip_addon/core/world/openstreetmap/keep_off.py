@@ -79,7 +79,8 @@ def _landings(shapes: PlanShapes, area: BaseGeometry, carriageway: BaseGeometry)
             crossed.update(way.nodes)
             if not carriageway.intersects(shapely.LineString(line)):
                 continue  # it crosses a driveway
-            yield _corridor(_extended(line), way.tags).intersection(kerbside)
+            corridor = shapely.LineString(_extended(line)).buffer(crossing_width(way.tags) / 2, cap_style="flat")
+            yield corridor.intersection(kerbside)
     streets = (way for way, _ in shapes.lines(area, "highway", None) if is_street(way.tags, service=True))
     for one in crossed_places(streets, shapes):
         if one.node not in crossed:
@@ -95,17 +96,9 @@ def _landings(shapes: PlanShapes, area: BaseGeometry, carriageway: BaseGeometry)
 
 def _extended(line: Float) -> Float:
     """Return a line (n, 2) extended straight at both ends."""
-
-    def beyond(end: Float, before: Float) -> Float:
-        way = end - before
-        point: Float = end + CROSSING_REACH * way / (np.hypot(*way) or 1.0)
-        return point
-
-    return np.array([beyond(line[0], line[1]), *line, beyond(line[-1], line[-2])])
-
-
-def _corridor(line: Float, tags: Tags) -> BaseGeometry:
-    return shapely.LineString(line).buffer(crossing_width(tags) / 2, cap_style="flat")
+    outwards = line[[0, -1]] - line[[1, -2]]
+    ends = line[[0, -1]] + CROSSING_REACH * outwards / np.maximum(np.hypot(*outwards.T), 1e-9)[:, None]
+    return np.vstack([ends[:1], line, ends[1:]])
 
 
 def _private_areas(shapes: PlanShapes, area: BaseGeometry) -> Iterator[BaseGeometry]:

@@ -62,18 +62,18 @@ def with_mapped_crossings(streets: StreetMap, source: StreetFile, shapes: PlanSh
     joints = {one.id for one in streets.junctions if one.is_joint}
     guessed = [
         replace(one, name=ASSUMED_CROSSING)
-        for one in streets.objects
+        for one in streets.road_map.objects
         # Crossings guessed where a street only continues have no evidence.
         if (found := _GUESSED_AT.fullmatch(one.id)) is not None
         and found[1] not in joints
         and not places.dwithin(shapely.Point(one.position[:2]), MAPPED_AROUND)
     ]
-    return replace(streets, objects=(*mapped, *guessed))
+    return replace(streets, road_map=replace(streets.road_map, objects=(*mapped, *guessed)))
 
 
 def guessed_crossings(streets: StreetMap, area: BaseGeometry) -> int:
     """Return the number of assumed crossings of streets in an area."""
-    places = [shapely.Point(one.position[:2]) for one in streets.objects if one.name == ASSUMED_CROSSING]
+    places = [shapely.Point(one.position[:2]) for one in streets.road_map.objects if one.name == ASSUMED_CROSSING]
     return int(shapely.intersects(area, places).sum())
 
 

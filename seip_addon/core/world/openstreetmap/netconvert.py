@@ -11,7 +11,7 @@ from ...errors import SeipError
 from ...geometry.plan import beside
 from ...progress import Progress
 from ...sumo_programs import find_sumo, run
-from ..traffic_simulation.street_network import NetworkEdge, StreetNetwork, read_network
+from ..traffic_simulation.street_network import NetworkEdge, StreetNetwork, read_network, shape_text
 from .extract import Way
 from .network_map import PRECISION
 from .street_lanes import SIDEWALK_WIDTH, divider_offset
@@ -125,9 +125,7 @@ def _moved_edges(network: StreetNetwork, ways: Mapping[int, Way]) -> Iterator[st
         after = _only(lines[one.id][1] for one in leaving.get(edge.to_node, ()) if one.to_node != edge.from_node)
         own = lines[name]
         moved = beside(np.vstack([*before, own, *after]), -aside)[len(before) :][: len(own)]
-        rows = (moved if moved[:, 2].any() else moved[:, :2]).tolist()
-        shape = " ".join(",".join(f"{value:.6f}" for value in row) for row in rows)
-        yield f'<edge id="{name}" spreadType="right" shape="{shape}"/>'
+        yield f'<edge id="{name}" spreadType="right" shape="{shape_text(moved, 6)}"/>'
 
 
 def _line(edge: NetworkEdge, network: StreetNetwork) -> Float:

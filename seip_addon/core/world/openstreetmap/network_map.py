@@ -20,12 +20,12 @@ from ...errors import SeipError
 from ...geometry.plan import beside, closed, opened, travelled, united, without
 from ..opendrive.lanes import LaneSurface
 from ..opendrive.objects import PlacedObject, PlacedSignal
-from ..opendrive.profile import Profile
+from ..opendrive.profile import linear_profile
 from ..opendrive.reference_line import Clothoid, ReferenceLine
 from ..opendrive.road_map import Junction, Road, RoadLink, RoadMap
 from ..streetscape.intersections import SAME_DIRECTION
 from ..streetscape.named_places import CROSSING
-from ..streetscape.road_surface import CARRIAGEWAY, in_groups
+from ..streetscape.road_surface import CARRIAGEWAY, in_groups, interpolated
 from ..streetscape.street_map import JunctionArea, Profiles, StreetMap
 from ..traffic_simulation.street_network import (
     LANE_WIDTH,
@@ -34,6 +34,7 @@ from ..traffic_simulation.street_network import (
     StreetNetwork,
     read_network,
     shape_points,
+    shape_text,
 )
 
 _LANE = re.compile(r'(<lane id=")([^"]*)("[^>]*? shape=")([^"]*)"')
@@ -81,8 +82,8 @@ class NetworkMap:
     text: str
     pieces: Mapping[str, tuple[str, float, float]]
 
-    def raised_text(self, profiles: Profiles) -> str:
-        """Return the file with new heights of the roads."""
+    def raised(self, profiles: Profiles) -> "NetworkMap":
+        """Return the network with new heights of the roads in its file."""
 
         def raised(match: re.Match[str]) -> str:
             number, low, high = self.pieces.get(match[2], ("", 0.0, 1.0))
@@ -97,9 +98,9 @@ class NetworkMap:
             shares = np.unique(np.concatenate([own, bends[(bends > 0.0) & (bends < 1.0)]]))
             x, y = (np.interp(shares, own, line[:, axis]) for axis in (0, 1))
             z = np.interp((low + (high - low) * shares) * along[-1], along, heights)
-            return f'{match[1]}{match[2]}{match[3]}{_shape(np.column_stack([x, y, z]))}"'
+            return f'{match[1]}{match[2]}{match[3]}{shape_text(np.column_stack([x, y, z]), PRECISION)}"'
 
-        return _LANE.sub(raised, self.text)
+        return replace(self, text=_LANE.sub(raised, self.text))
 
     def walking_on(self, sidewalks: BaseGeometry) -> "NetworkMap":
         """Return the network with its pavements moved to mapped sidewalks along them, given as lines.
@@ -120,7 +121,7 @@ class NetworkMap:
             line = _moved_walk(shape_points(match[4]), mapped, carriageway)
             if line is None or carriageway.intersects(shapely.LineString(line)):
                 return match[0]
-            return f'{match[1]}{match[2]}{match[3]}{_shape(line)}" customShape="1"'
+            return f'{match[1]}{match[2]}{match[3]}{shape_text(line, PRECISION)}" customShape="1"'
 
         return self if mapped.is_empty else replace(self, text=_LANE.sub(moved, self.text))
 
@@ -144,12 +145,6 @@ def _moved_walk(line: Float, mapped: BaseGeometry, carriageway: BaseGeometry) ->
     by = np.interp(np.arange(len(plan)), np.flatnonzero(known), left[known])
     places[:, :2] += by[:, None] * np.column_stack([-along[:, 1], along[:, 0]])
     return places
-
-
-def _shape(line: Float) -> str:
-    """Return the text of a line (n, 3), without heights if all are zero."""
-    rows = (line if line[:, 2].any() else line[:, :2]).tolist()
-    return " ".join(",".join(f"{value:.{PRECISION}f}" for value in row) for row in rows)
 
 
 def credited(text: str, attribution: Iterable[str]) -> str:
@@ -192,17 +187,20 @@ def read_network_map(path: Path) -> NetworkMap:
 
 
 def _streets(network: StreetNetwork, pieces: dict[str, tuple[str, float, float]]) -> StreetMap:
-    roads = list(_roads(network, pieces))
+    joints = frozenset(_joints(network))
+    roads = list(_roads(network, pieces, joints))
     road_map = RoadMap(
         name="",
         header_offset=np.array([*-network.offset, 0.0, 0.0]),
         geo_reference=network.projection,
         roads=tuple(road for road, _ in roads),
         junctions=tuple(Junction(number, number) for number in network.shapes),
+        objects=tuple(_crossings(network)),
+        signals=tuple(_signals(network)),
     )
     lanes = tuple(itertools.chain.from_iterable(lanes for _, lanes in roads))
-    areas = tuple(_junction_areas(network, lanes, frozenset(_joints(network))))
-    return StreetMap(road_map, lanes, tuple(_crossings(network)), tuple(_signals(network)), areas)
+    areas = tuple(_junction_areas(network, lanes, joints))
+    return StreetMap(road_map, lanes, areas)
 
 
 def _type(lane: NetworkLane) -> str:
@@ -253,7 +251,7 @@ def _directions(headings: Sequence[float]) -> int:
 
 
 def _roads(
-    network: StreetNetwork, pieces: dict[str, tuple[str, float, float]]
+    network: StreetNetwork, pieces: dict[str, tuple[str, float, float]], joints: frozenset[str]
 ) -> Iterator[tuple[Road, list[LaneSurface]]]:
     """Yield the roads outside and within junctions, with their lanes; add the roads of internal lanes to ``pieces``."""
     for edge in network.edges.values():
@@ -266,7 +264,6 @@ def _roads(
         if own:
             is_track = {lane.type for lane in own.values()} - {"sidewalk"} == {"tram"}
             yield _road(edge.id, "" if is_track else edge.name, None, own, links, left_hand=network.left_hand)
-    joints = frozenset(_joints(network))
     for (number, before, after), lanes in _connecting(network, pieces).items():
         junction = network.edges[before].to_node
         links = (RoadLink("road", before, "end"), RoadLink("road", after, "start"))
@@ -322,11 +319,8 @@ def _road(
     order = sorted(lanes, reverse=True)  # from the middle of the street outwards
     # All lanes get the same rows: at the same share of their length, so that neighbours keep a common edge.
     shares = [_shares(lanes[one].line) for one in order]
-    rows = np.unique(np.round(np.concatenate(shares), 9))
-    lines = (
-        np.column_stack([np.interp(rows, share, lanes[one].line[:, axis]) for axis in range(3)])
-        for one, share in zip(order, shares, strict=True)
-    )
+    rows: Float = np.unique(np.round(np.concatenate(shares), 9))
+    lines = (interpolated(rows, share, lanes[one].line) for one, share in zip(order, shares, strict=True))
     halves = [lanes[one].width / 2 for one in order]
     edges = [(beside(line, half), beside(line, -half)) for line, half in zip(lines, halves, strict=True)]
     reference = edges[0][1 if left_hand else 0]
@@ -341,15 +335,13 @@ def _road(
     line = ReferenceLine(
         s[:-1], np.diff(s), np.column_stack([reference[:-1, :2], heading]), (Clothoid(0.0, 0.0),) * (len(s) - 1)
     )
-    slopes = np.diff(reference[:, 2]) / np.diff(s)
-    elevation = Profile(s[:-1], np.column_stack([reference[:-1, 2], slopes, np.zeros((len(slopes), 2))]))
     road = Road(
         id=number,
         name=name,
         junction_id=junction,
         keeps_left=left_hand,
         reference_line=line,
-        elevation=elevation,
+        elevation=linear_profile(s, reference[:, 2]),
         predecessor=links[0],
         successor=links[1],
     )
@@ -418,7 +410,7 @@ def crossing(number: str, name: str, line: Float, depth: float) -> PlacedObject:
     position = np.array([*(first + last) / 2, 0.0])
     width = float(math.hypot(x, y))
     heading = math.atan2(y, x) - math.pi / 2
-    return PlacedObject("", number, name, CROSSING, position, heading, 0.0, 0.0, depth, width, 0.0, 0.0, ())
+    return PlacedObject("", number, name, CROSSING, position, heading, length=depth, width=width)
 
 
 def _signals(network: StreetNetwork) -> Iterator[PlacedSignal]:
@@ -432,7 +424,4 @@ def _signals(network: StreetNetwork) -> Iterator[PlacedSignal]:
             own = edge.lanes[int(lane[1])]
             if _type(own) in ("driving", "tram") and len(own.line) > 1:
                 x, y = own.line[-1] - own.line[-2]
-                position = own.points[-1] + [0.0, 0.0, LAMP_HEIGHT]
-                number = f"{one['tl']}_{one['linkIndex']}"
-                heading = math.atan2(y, x)
-                yield PlacedSignal(edge.id, number, "", "1000011", dynamic=True, position=position, yaw=heading)
+                yield PlacedSignal(edge.id, "", own.points[-1] + [0.0, 0.0, LAMP_HEIGHT], math.atan2(y, x))

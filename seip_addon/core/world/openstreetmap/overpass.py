@@ -4,7 +4,6 @@ import gzip
 import math
 import os
 import re
-import socket
 import ssl
 import sys
 import threading
@@ -48,16 +47,11 @@ _SLOT = re.compile(rb"\bin (-?\d+) seconds")
 _PAGE = re.compile(rb"(?:\xef\xbb\xbf)?\s*(?:<\?xml[^>]*>)?\s*(?:<!doctype html|<html)", re.IGNORECASE)
 _NAME = re.compile(r"(-?\d+\.\d{5})_(-?\d+\.\d{5})_(\d+)m_(\d{4}-\d\d-\d\d)\.osm\.gz")
 _CUT_OFF = f"the answer of {{host}} is cut off: try again, name a different Overpass server, {EXPORT}"
-_UNREACHABLE = f"{{host}} cannot be reached ({{text}}): check the connection to the internet, {EXPORT}"
+_UNREACHABLE = (
+    "{host} cannot be reached ({text}): check the connection to the internet and the address of the Overpass server, "
+    + EXPORT
+)
 _FAULTS: tuple[tuple[type[Exception] | tuple[type[Exception], ...], str], ...] = (
-    (
-        socket.gaierror,
-        "{host} was not found: check the connection to the internet and the address of the Overpass server, " + EXPORT,
-    ),
-    (
-        ConnectionRefusedError,
-        "{host} refuses connections: check the address of the Overpass server, or try again later, " + EXPORT,
-    ),
     (
         TimeoutError,
         "{host} has sent nothing for {seconds:g} s: try again later, name a different Overpass server, " + EXPORT,
@@ -67,7 +61,7 @@ _FAULTS: tuple[tuple[type[Exception] | tuple[type[Exception], ...], str], ...] =
         "the connection to {host} is not secure ({text}): a proxy may be in between; sign in to the network in your "
         "browser, install the certificate of the proxy, " + EXPORT,
     ),
-    ((EOFError, HTTPException, zlib.error, ConnectionError), _CUT_OFF),
+    ((EOFError, HTTPException, zlib.error, ConnectionResetError, ConnectionAbortedError), _CUT_OFF),
 )
 """Messages about connections that fail, by the kind of error."""
 

@@ -93,7 +93,7 @@ class PlanShapes:
     def _of_way(self, way: Way) -> BaseGeometry | None:
         line = self.line(way)
         if way.nodes[:1] != way.nodes[-1:] or len(line) < len(way.nodes):
-            if len(line) < 3 or not _is_nearly_whole(way, line):
+            if len(line) < 3 or 2 * len(line) < len(way.nodes):
                 self.dropped[TOO_LITTLE] += 1
                 return None
             self.dropped[NOT_CLOSED] += line[0].tolist() != line[-1].tolist()
@@ -129,11 +129,6 @@ class PlanShapes:
             x, y = self.point(self.extract.nodes[number])
             self._known[number] = (float(x), float(y))
         return self._known[number]
-
-
-def _is_nearly_whole(way: Way, line: Float) -> bool:
-    """Return whether an outline still has at least half of its nodes."""
-    return 2 * len(line) >= len(way.nodes)
 
 
 def polygons(area: BaseGeometry) -> Iterator[shapely.Polygon]:

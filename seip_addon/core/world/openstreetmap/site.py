@@ -17,7 +17,7 @@ from ...geometry.plan import united
 from ...progress import Progress
 from ...site.scene_geometry import FROM_EXTRACT
 from ..opendrive.junctions import STREETS, nearest_junctions, streets_of_junctions
-from ..opendrive.lanes import LaneSurface, lane_surfaces
+from ..opendrive.lanes import LaneSurface
 from ..opendrive.road_map import Junction, RoadMap
 from ..streetscape import road_surface
 from ..streetscape.description import DEFAULT_RADIUS, SiteDescription
@@ -26,7 +26,7 @@ from ..streetscape.levels import UNNAMED_ROAD
 from ..streetscape.named_places import street_names
 from ..streetscape.place import SCENE_MARGIN
 from ..streetscape.street_map import StreetMap
-from ..streetscape.terrain import FlatLand
+from ..streetscape.terrain import level_land
 from .assumptions import MAX_NAMED, assumed_crossings, assumed_lanes, implausible_lane_notes, lane_notes, lone_signals
 from .extract import EARTH_RADIUS, MAX_LATITUDE, Extract, Way, cropped, read_extract, window
 from .heights import StreetHeights, street_heights
@@ -54,10 +54,10 @@ class ExtractPlace:
 
     Parameters
     ----------
-    near : (latitude, longitude) or None, degrees
+    near_latlon : (latitude, longitude) or None, degrees
         Position of the place.
-    streets : tuple of str
-        Names of two or more streets that meet there, instead of ``near``.
+    junction : tuple of str
+        Names of two or more streets that meet there, instead of the position; in a map, id or name of the junction.
     radius, approaches : float or None, metres
         See `SiteDescription`; without either the region follows the approaches of the junction.
     service : bool
@@ -68,8 +68,8 @@ class ExtractPlace:
         Names of streets on the level to study.
     """
 
-    near: tuple[float, float] | None = None
-    streets: tuple[str, ...] = ()
+    near_latlon: tuple[float, float] | None = None
+    junction: tuple[str, ...] = ()
     radius: float | None = None
     approaches: float | None = None
     service: bool = False
@@ -98,12 +98,8 @@ class ExtractSite:
 
     Parameters
     ----------
-    streets : StreetMap
-        Streets as netconvert lays them out, with the crossings of the extract: flat, unless the extract has heights.
     network : NetworkMap
-        Network of these streets.
-    text : str
-        Text of the network, on which traffic is simulated.
+        Streets as netconvert lays them out, with the crossings of the extract: flat, unless the extract has heights.
     description : SiteDescription
         Objects next to the streets, and the extent of the region.
     notes : tuple of str
@@ -116,9 +112,7 @@ class ExtractSite:
         Area that notes refer to, about the region of interest; map coordinates.
     """
 
-    streets: StreetMap
     network: NetworkMap
-    text: str
     description: SiteDescription
     notes: tuple[str, ...]
     source: StreetFile
@@ -127,33 +121,29 @@ class ExtractSite:
 
     def on_ground(self) -> "ExtractSite":
         """Return the same site with its streets raised to the ground, onto bridges and into underpasses."""
-        relief, road_map = self.description.relief, self.streets.road_map
+        relief, streets = self.description.relief, self.network.streets
         ground = None if relief is None else relief.rise
-        heights = street_heights(road_map, self.source, self.shapes, ground)
+        heights = street_heights(streets.road_map, self.source, self.shapes, ground)
         raised = replace(self, notes=(*self.notes, *heights.notes, *self._ramp_notes(heights)))
-        is_raised = any(along_road.any() for _, along_road in heights.profiles.values())
-        if is_raised:
-            streets = self.streets.raised(heights.above_ground)
-            raised = replace(raised, streets=streets, text=self.network.raised_text(heights.profiles))
-        if relief is not None:
-            relief = replace(relief, bridges=heights.bridges)
-            return replace(raised, description=replace(self.description, relief=relief))
-        if is_raised and not self.source.elevated:
-            land = FlatLand(0.0, heights.bridges)
-            return replace(raised, description=replace(self.description, flat_land=land))
-        return raised
+        if any(along_road.any() for _, along_road in heights.profiles.values()):
+            network = replace(self.network.raised(heights.profiles), streets=streets.raised(heights.above_ground))
+            raised = replace(raised, network=network)
+            relief = level_land(0.0) if relief is None and not self.source.elevated else relief
+        if relief is None:
+            return raised
+        relief = replace(relief, bridges=heights.bridges)
+        return replace(raised, description=replace(self.description, relief=relief))
 
     def _ramp_notes(self, heights: StreetHeights) -> Iterator[str]:
         """Yield a note on the assumed heights of bridges, underpasses and their ramps in the area."""
-        road_map = self.streets.road_map
+        road_map = self.network.streets.road_map
         names = street_names(road_map)
         moved: dict[str, float] = {}
         for number, (along, above) in heights.above_ground.items():
             if not np.abs(above).max() >= MIN_RAMP:
                 continue
             (road,) = (road for road in road_map.roads if road.id == number)
-            places = shapely.points(road.frame(along).origin[:, :2])
-            near = above[shapely.intersects(self.area, places)]
+            near = above[shapely.intersects_xy(self.area, road.frame(along).origin[:, :2])]
             if len(near) and np.abs(near).max() >= MIN_RAMP and road.junction_id is None:
                 most = float(near[np.argmax(np.abs(near))])
                 name = names.get(number, UNNAMED_ROAD)
@@ -206,7 +196,6 @@ def site_of_extract(
         junction=junction.id if place.radius is None and junction is not None else None,
         radius=place.radius,
         approaches=place.approaches,
-        from_centre_lines=True,
         roundabouts=extent.roundabouts,
         map_source=FROM_EXTRACT,
         widths_assumed=_assumed_widths(near_streets),
@@ -225,8 +214,8 @@ def site_of_extract(
         *lone_signals([node for node in lone if extent.seen.intersects(shapely.Point(shapes.point(node)))]),
     )
     sidewalks = shapely.MultiLineString([way.line for way in description.ways if way.line is not None])
-    network = network.walking_on(sidewalks)
-    return ExtractSite(streets, network, network.text, description, notes, source, shapes, extent.seen)
+    network = replace(network.walking_on(sidewalks), streets=streets)
+    return ExtractSite(network, description, notes, source, shapes, extent.seen)
 
 
 def _extract_around(
@@ -236,8 +225,8 @@ def _extract_around(
     # Streets are laid out well beyond the region, for traffic; 200 m more hold the junction that was named, whose
     # centre may lie away from the place.
     most = place.reach + STREET_REACH + 200.0
-    extract = yield from read_extract(path, None if place.near is None else window(*place.near, most))
-    near, notes = (place.near, ()) if place.near else meeting_place(extract, place.streets)
+    extract = yield from read_extract(path, None if place.near_latlon is None else window(*place.near_latlon, most))
+    near, notes = (place.near_latlon, ()) if place.near_latlon else meeting_place(extract, place.junction)
     return cropped(extract, window(*near, most)), near, notes
 
 
@@ -251,7 +240,7 @@ def _network(
         extract, streets_path, window(*near, reach), service=place.service, left_hand=place.left_hand
     )
     try:
-        if source.streets == 0:
+        if not source.ways:
             raise _no_street(extract, near, reach)
         yield from convert(source, streets_path, map_path, sumo)
     finally:
@@ -334,7 +323,7 @@ def _extent(
 
 def _name(extract: Extract, streets: StreetMap, source: StreetFile, place: ExtractPlace, extent: _Extent) -> str:
     """Return the title of a place: the streets that were asked for, or those that meet there."""
-    names = [spelt(extract, name) for name in place.streets] or _title(streets, source, place, extent)
+    names = [spelt(extract, name) for name in place.junction] or _title(streets, source, place, extent)
     if names:
         return STREETS.join(names)
     latitude, longitude = extent.near
@@ -356,22 +345,25 @@ def _assumed_widths(ways: Iterable[Way]) -> frozenset[str]:
 
 def _check(path: Path, place: ExtractPlace) -> None:
     """Raise an error if a place is not given, or not validly."""
-    if place.near is None and not place.streets:
-        raise SeipError(f'{path.name} needs a place: --near-latlon LAT LON, or --junction "One Street" "Other Street"')
     for name, length in (("radius", place.radius), ("approaches", place.approaches)):
         if length is not None and not 0.0 < length < math.inf:
             raise SeipError(f"--{name} {length:g} is not a valid length: give metres above zero")
-    if place.near is not None and not (abs(place.near[0]) <= MAX_LATITUDE and abs(place.near[1]) <= 180.0):
-        raise SeipError(
-            f"--near-latlon {place.near[0]:g} {place.near[1]:g} is not a valid place: give degrees, the latitude "
-            f"first, up to {MAX_LATITUDE:g}, then the longitude, up to 180"
-        )
-    if place.near is None and len({name.strip().casefold() for name in place.streets} - {""}) < len(place.streets):
+    names = {name.strip().casefold() for name in place.junction} - {""}
+    if place.near_latlon is not None:
+        latitude, longitude = place.near_latlon
+        if not (abs(latitude) <= MAX_LATITUDE and abs(longitude) <= 180.0):
+            raise SeipError(
+                f"--near-latlon {latitude:g} {longitude:g} is not a valid place: give degrees, the latitude first, up "
+                f"to {MAX_LATITUDE:g}, then the longitude, up to 180"
+            )
+    elif not names:
+        raise SeipError(f'{path.name} needs a place: --near-latlon LAT LON, or --junction "One Street" "Other Street"')
+    if place.junction and len(names) < max(len(place.junction), 2):
         raise SeipError('--junction takes the names of two different streets: --junction "One Street" "Other Street"')
 
 
 def surroundings_of_map(
-    path: Path, road_map: RoadMap, description: SiteDescription, middle: Float, reach: float
+    path: Path, streets: StreetMap, description: SiteDescription, middle: Float, reach: float
 ) -> Generator[Progress, None, tuple[SiteDescription, tuple[str, ...]]]:
     """Add the surroundings of a place on a map, read from an extract, to a description.
 
@@ -379,7 +371,7 @@ def surroundings_of_map(
     ----------
     path : Path
         Extract.
-    road_map : RoadMap
+    streets : StreetMap
         Map that the place is on.
     description : SiteDescription
         Description to add to.
@@ -394,8 +386,7 @@ def surroundings_of_map(
         The extract cannot be read or has no objects at the place, or the map has no known projection.
     """
     extract = yield from read_extract(path)
-    shapes = PlanShapes(extract, _projection(road_map), road_map.header_offset[:2])
-    streets = StreetMap(road_map, tuple(lane for road in road_map.roads for lane in lane_surfaces(road)))
+    shapes = PlanShapes(extract, _projection(streets.road_map), streets.road_map.header_offset[:2])
     area = shapely.Point(middle).buffer(reach + SCENE_MARGIN + STANDS_AROUND, quad_segs=16)
     found = surroundings(shapes, area, _carriageway(streets, middle, reach))
     if not found.has_objects:
@@ -473,7 +464,7 @@ def _title(streets: StreetMap, source: StreetFile, place: ExtractPlace, extent: 
             return crossing_pair(ranked, headings_at(road_map, lanes, extent.together))
     if level:
         return level[:2]
-    called = {road.id: road.name for road in road_map.roads}
+    called = road_map.names
     driving = [lane for lane in road_surface.in_groups(lanes, ["driving"]) if called[lane.road_id]]
     here = shapely.Point(extent.middle)
     nearest = min(driving, key=lambda lane: float(lane.polygon.distance(here)), default=None)

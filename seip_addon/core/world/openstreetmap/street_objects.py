@@ -43,7 +43,7 @@ POST_KINDS = {
 """Assumed heights (metres) of posts, by key and value."""
 POWER_POLES = {"power", "utility_pole"}
 """Keys and values of posts that carry lines and belong to the operator of these."""
-SIGNAL_HEIGHT, SIGNAL_ARM = 6.0, 0.0
+SIGNAL_HEIGHT = 6.0  # metres
 SHELTER_SIZE, SHELTER_HEIGHT, SHELTER_ROOF = (4.0, 1.5), 2.5, 0.15  # metres: length and depth, height, and roof
 FOOTWAYS = "Footways"
 WAY_WIDTHS: dict[str, tuple[float, str, str, RuleName | None]] = {
@@ -119,27 +119,29 @@ def _tree_rows(shapes: PlanShapes, area: BaseGeometry) -> Iterator[Trees]:
             yield _trees(near, way.tags, ASSUMED)  # the row is known, its trees are not
 
 
+def _post(place: Float, tags: Tags, usual: float, arm: float = 0.0) -> Poles:
+    height, assumed = _height(tags, usual, MAX_POST)
+    return Poles(place[None], height, arm, None, FROM_EXTRACT, assumed)
+
+
 def _lamps(nodes: list[tuple[Node, Float]]) -> Iterator[Poles]:
     for node, place in nodes:
         if node.tags.get("highway") == "street_lamp" and node.tags.get("support") not in ("wall", "wire", "ceiling"):
-            height, assumed = _height(node.tags, LIGHT_HEIGHT, MAX_POST)
-            yield Poles(place[None], height, LIGHT_ARM, None, FROM_EXTRACT, assumed)
+            yield _post(place, node.tags, LIGHT_HEIGHT, LIGHT_ARM)
 
 
 def _signals(nodes: list[tuple[Node, Float]], carriageway: BaseGeometry) -> Iterator[Poles]:
     for node, place in nodes:
         is_signal = node.tags.get("highway") == "traffic_signals" or node.tags.get("traffic_signals") == "signal"
         if is_signal and not carriageway.intersects(shapely.Point(place)):
-            height, assumed = _height(node.tags, SIGNAL_HEIGHT, MAX_POST)
-            yield Poles(place[None], height, SIGNAL_ARM, None, FROM_EXTRACT, assumed)
+            yield _post(place, node.tags, SIGNAL_HEIGHT)
 
 
 def _posts(nodes: list[tuple[Node, Float]]) -> Iterator[Poles]:
     for node, place in nodes:
         for (key, value), usual in POST_KINDS.items():
             if node.tags.get(key) == value and node.tags.get("highway") != "street_lamp":
-                height, assumed = _height(node.tags, usual, MAX_POST)
-                post = Poles(place[None], height, 0.0, None, FROM_EXTRACT, assumed)
+                post = _post(place, node.tags, usual)
                 carries_lines = not POWER_POLES.isdisjoint((key, value))
                 yield replace(post, name="Power pole", keep_off="power-poles") if carries_lines else post
                 break

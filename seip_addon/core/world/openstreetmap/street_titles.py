@@ -6,15 +6,14 @@ import math
 from collections import defaultdict
 from collections.abc import Collection, Iterable, Mapping, Sequence
 
-import numpy as np
 import shapely
 
 from ...errors import SeipError
 from ..opendrive.lanes import LaneSurface
 from ..opendrive.road_map import RoadMap
 from ..streetscape.intersections import SAME_DIRECTION, TOUCH
-from .crossings import metres
-from .extract import Extract, Node, Way
+from .crossings import clustered
+from .extract import Extract, Way
 from .streets import CLASSES, is_street, shown_name
 
 MAX_JUNCTION_DISTANCE = 60.0  # metres from a requested place to its junction at most
@@ -28,8 +27,7 @@ def ranks(ways: Iterable[Way]) -> defaultdict[str, int]:
     """Return the rank of each street by name: the rank of its highest class, with slip roads last."""
     ranks: defaultdict[str, int] = defaultdict(lambda: len(RANKS))
     for way in ways:
-        name = {**way.tags, **shown_name(way.tags)}.get("name", "")
-        kind = way.tags.get("highway", "")
+        name, kind = shown_name(way.tags), way.tags.get("highway", "")
         ranks[name] = min(ranks[name], RANKS.index(kind) if kind in RANKS else len(RANKS))
     return ranks
 
@@ -39,12 +37,11 @@ def headings_at(
 ) -> defaultdict[str, list[float]]:
     """Return the directions (radians) of each street at a group of junctions, by street name."""
     area = shapely.union_all([lane.polygon for lane in lanes if lane.junction_id in junctions])
-    names = {road.id: road.name for road in road_map.roads}
     headings: defaultdict[str, list[float]] = defaultdict(list)
     for lane in lanes:
         if lane.junction_id is None and area.distance(lane.polygon) < TOUCH:
             x, y = (lane.left[-1] - lane.left[0])[:2].tolist()
-            headings[names[lane.road_id]].append(math.atan2(y, x))
+            headings[road_map.names[lane.road_id]].append(math.atan2(y, x))
     return headings
 
 
@@ -66,10 +63,8 @@ def spelt(extract: Extract, name: str) -> str:
     """Return the name of a street in the spelling of the extract, from any of its names."""
     wanted = name.strip().casefold()
     for way in _streets_called(extract, name):
-        shown = {**way.tags, **shown_name(way.tags)}
-        for key in NAMES:
-            if way.tags.get(key, "").casefold() == wanted:
-                return shown.get(key, "") or name
+        key = next(key for key in NAMES if way.tags.get(key, "").casefold() == wanted)
+        return shown_name(way.tags) if key == "name" else way.tags[key]
     return name.strip()
 
 
@@ -87,30 +82,18 @@ def meeting_place(extract: Extract, names: tuple[str, ...]) -> tuple[tuple[float
     if not shared:
         both = " and ".join(map(repr, names))
         raise SeipError(f"{both} do not meet in {extract.name}: name streets that share a node")
-    groups: list[list[Node]] = []
-    for node in (extract.nodes[number] for number in shared):
-        # Single-linkage clustering: a node merges all groups that have a node near it. Dual carriageways that cross
-        # share up to four nodes, which are one place.
-        met = [group for group in groups if _away(node, group) < MAX_JUNCTION_DISTANCE]
-        groups = [*(group for group in groups if group not in met), [node, *itertools.chain(*met)]]
-    places = [
-        (sum(node.latitude for node in group) / len(group), sum(node.longitude for node in group) / len(group))
-        for group in sorted(groups, key=len, reverse=True)
-    ]
+    # Dual carriageways that cross share up to four nodes, which are one place.
+    nodes_there = [(extract.nodes[number].latitude, extract.nodes[number].longitude) for number in shared]
+    places = [group.mean(axis=0).tolist() for group in clustered(nodes_there, MAX_JUNCTION_DISTANCE)]
+    place = (places[0][0], places[0][1])
     if len(places) == 1:
-        return places[0], ()
+        return place, ()
     first, *others = [f"{latitude:.5f} {longitude:.5f}" for latitude, longitude in places[:4]]
     note = (
         f"{' and '.join(names)} meet in {len(places)} places; the one at {first} is used: for a different one give "
         f"--near-latlon {' or '.join(others)}"
     )
-    return places[0], (note,)
-
-
-def _away(node: Node, others: Sequence[Node]) -> float:
-    """Return the distance from a node to the nearest of others, metres."""
-    places = metres([(other.latitude, other.longitude) for other in others], (node.latitude, node.longitude))
-    return float(np.hypot(*places.T).min())
+    return place, (note,)
 
 
 def _streets_called(extract: Extract, name: str) -> list[Way]:

@@ -15,7 +15,6 @@ import numpy as np
 import shapely
 
 from ...arrays import Float
-from ...geometry.tangent_plane import plan_metres
 from .bridges import Structures, structures
 from .extract import Extract, Node, Tags, Way, reversed_tags
 from .handedness import drives_on_the_left
@@ -64,8 +63,6 @@ class StreetFile:
 
     Parameters
     ----------
-    streets : int
-        Number of streets written.
     elevated : bool
         Whether the nodes have elevations.
     left_hand : bool
@@ -86,7 +83,6 @@ class StreetFile:
         Assumptions made, as messages.
     """
 
-    streets: int
     elevated: bool
     left_hand: bool
     roundabouts: tuple[frozenset[int], ...]
@@ -155,9 +151,10 @@ def write_streets(
     elevated = bool(used) and sum(height is not None for height in heights) >= MIN_ELEVATED * len(used)
     # netconvert guesses lanes, widths, pavements and signals by its own defaults. The streets are therefore written
     # with these made explicit, and with signals moved to the junctions that they control.
-    medians = _Medians(extract, [way for _, way in pieces])
-    places = dict(zip(extract.nodes, _in_metres(extract, list(extract.nodes.values())), strict=True))
-    signals = matched_signals(extract, [way for _, way in pieces], places)
+    ways = [way for _, way in pieces]
+    medians = _Medians(extract, ways)
+    places = dict(zip(extract.nodes, extract.in_metres(extract.nodes.values()), strict=True))
+    signals = matched_signals(extract, ways, places)
     lines = ['<?xml version="1.0" encoding="UTF-8"?>', '<osm version="0.6">']
     for number, height in zip(used, heights, strict=True):
         lines += _node(number, extract.nodes[number], height if elevated else None, signals)
@@ -165,20 +162,16 @@ def write_streets(
         lines += _way(number, way.nodes, _tags(way, medians, left_hand=left_hand))
     lines += _restrictions(extract, {number for number, _ in pieces})
     path.write_text(os.linesep.join([*lines, "</osm>", ""]), encoding="utf-8")
-    roundabouts = joined(way.nodes for _, way in pieces if is_roundabout(way.tags))
-    slip_ends = tuple(_slip_ends(extract, [way for _, way in pieces]))
-    crossed = structures(extract, pieces, places)
     return StreetFile(
-        len(pieces),
         elevated,
         left_hand,
-        roundabouts,
-        slip_ends,
-        dict(pieces),
-        crossed,
-        signals.unmatched,
-        widened,
-        tuple(notes),
+        roundabouts=joined(way.nodes for way in ways if is_roundabout(way.tags)),
+        slip_ends=tuple(_slip_ends(extract, ways)),
+        ways=dict(pieces),
+        structures=structures(extract, pieces, places),
+        lone_signals=signals.unmatched,
+        widened=widened,
+        notes=tuple(notes),
     )
 
 
@@ -236,7 +229,7 @@ def _widest(streets: Mapping[int, Way], number: int, onward: Iterable[int]) -> T
 
 def _is_short(extract: Extract, way: Way) -> bool:
     """Return whether a way is no longer than `SHORT_PIECE`; False if the extract lacks one of its nodes."""
-    line = _in_metres(extract, extract.line(way))
+    line = extract.in_metres(extract.line(way))
     return len(line) == len(way.nodes) and float(np.hypot(*np.diff(line, axis=0).T).sum()) <= SHORT_PIECE
 
 
@@ -274,19 +267,12 @@ def _slip_ends(extract: Extract, ways: Sequence[Way]) -> Iterator[int]:
             neighbours.setdefault(one, set()).add(other)
             neighbours.setdefault(other, set()).add(one)
     meeting = [number for number, others in neighbours.items() if len(others) > 2]
-    places = _in_metres(extract, [extract.nodes[number] for number in meeting])
+    places = extract.in_metres([extract.nodes[number] for number in meeting])
     links = {end for way in ways if is_link(way.tags) and is_one_way(way.tags) for end in (way.nodes[0], way.nodes[-1])}
     for number, place in zip(meeting, places, strict=True):
         # The smallest distance is that of the node to itself, 0; the second smallest is to the nearest other junction.
         if number in links and np.sort(np.hypot(*(places - place).T))[1:2].min(initial=math.inf) > JOIN_DISTANCE:
             yield number
-
-
-def _in_metres(extract: Extract, nodes: Sequence[Node]) -> Float:
-    """Return the positions of nodes (n, 2), metres east and north of the extract's first node."""
-    degrees = np.array([(node.latitude, node.longitude) for node in nodes], dtype=np.float64).reshape(-1, 2)
-    first = next(iter(extract.nodes.values()))
-    return plan_metres(degrees, np.array([first.latitude, first.longitude]))
 
 
 def joined(ways: Iterable[tuple[int, ...]]) -> tuple[frozenset[int], ...]:
@@ -323,8 +309,9 @@ def _pieces(extract: Extract, window: tuple[float, float, float, float], *, serv
             and west <= node.longitude <= east
             for one in way.nodes
         ]
-        for place, (first, last) in enumerate(_runs(inside)):
-            nodes = way.nodes[max(first - 1, 0) : last + 1]  # one node beyond, where the extract has it
+        runs = [list(run) for held, run in itertools.groupby(range(len(inside)), inside.__getitem__) if held]
+        for place, run in enumerate(runs):
+            nodes = way.nodes[max(run[0] - 1, 0) : run[-1] + 2]  # one node beyond, where the extract has it
             # Every piece shares the tags object of its way: `bridges` and `heights` find the pieces of one way by its
             # identity.
             held = tuple(one for one in nodes if one in extract.nodes)
@@ -332,17 +319,6 @@ def _pieces(extract: Extract, window: tuple[float, float, float, float], *, serv
                 continue
             fresh += place > 0
             yield (number if place == 0 else fresh), Way(held, way.tags)
-
-
-def _runs(inside: list[bool]) -> Iterator[tuple[int, int]]:
-    """Yield the first index and the index after the last of each run of True values."""
-    start = None
-    for place, held in enumerate([*inside, False]):
-        if held and start is None:
-            start = place
-        elif not held and start is not None:
-            yield start, place
-            start = None
 
 
 def _node(number: int, node: Node, height: float | None, signals: Signals) -> list[str]:
@@ -390,7 +366,7 @@ def _restrictions(extract: Extract, streets: set[int]) -> Iterator[str]:
 def _tags(way: Way, medians: "_Medians", *, left_hand: bool) -> dict[str, str]:
     """Return the tags of a street for netconvert, with explicit lanes, widths, pavements and cycle lanes."""
     given = way.tags
-    tags = {key: given[key] for key in COPIED if key in given} | shown_name(given)
+    tags = {key: given[key] for key in COPIED if key in given} | ({"name": name} if (name := shown_name(given)) else {})
     if given.get("railway") in TRACKS and "highway" not in given:
         return tags
     if given.get("highway") == "road":  # a street of unknown class, which netconvert does not have
@@ -424,16 +400,13 @@ def _tags(way: Way, medians: "_Medians", *, left_hand: bool) -> dict[str, str]:
     return tags
 
 
-def shown_name(tags: Tags) -> dict[str, str]:
-    """Return a tag with the displayed name of a street if it differs from ``name``; otherwise an empty dict.
+def shown_name(tags: Tags) -> str:
+    """Return the displayed name of a street, "" if it has none.
 
     Names in scripts that the font of the pictures lacks are replaced by ``name:en``; roads without a name use ``ref``.
     """
-    name = tags.get("name", "")
-    english = tags.get("name:en")
-    if not name:
-        return {"name": tags["ref"]} if tags.get("ref") else {}
-    return {"name": english} if english and any(character >= _FIRST_OTHER for character in name) else {}
+    name = tags.get("name") or tags.get("ref", "")
+    return tags.get("name:en") or name if any(character >= _FIRST_OTHER for character in name) else name
 
 
 def _sidewalks(way: Way, medians: "_Medians", *, left_hand: bool) -> tuple[bool, bool]:
@@ -482,11 +455,10 @@ class _Medians:
                 starts.append(line[:-1])
                 stops.append(line[1:])
                 names += [way.tags.get("name", "")] * (len(line) - 1)
-        empty = np.empty((0, 2))
-        self._start, self._stop = (np.concatenate([empty, *points]) for points in (starts, stops))
+        start, stop = (np.concatenate([np.empty((0, 2)), *points]) for points in (starts, stops))
+        self._along = (stop - start) / np.maximum(np.hypot(*(stop - start).T), 1e-9)[:, None]
         self._names = np.array(names, dtype=object)
-        lines = shapely.linestrings(np.stack([self._start, self._stop], axis=1))
-        self._tree = shapely.STRtree(list(lines))
+        self._tree = shapely.STRtree(shapely.linestrings(np.stack([start, stop], axis=1)))
 
     def beside(self, way: Way) -> tuple[bool, bool]:
         """Return whether the opposite carriageway of a one-way street lies on its left, and on its right."""
@@ -494,26 +466,24 @@ class _Medians:
         steps = np.diff(line, axis=0)
         if not len(steps):
             return False, False
-        # Cast a ray to each side from the middle of each segment: where carriageways part around a refuge, they are
-        # parallel for a few metres only. It starts at 2 m, so as not to meet the street itself.
-        found = [False, False]
-        for start, step in zip(line, steps, strict=False):
-            middle, along = start + step / 2, step / (np.hypot(*step) or 1.0)
-            aside = np.array([-along[1], along[0]])
-            for side, sign in enumerate((1.0, -1.0)):
-                ray = shapely.linestrings(np.stack([middle + 2.0 * sign * aside, middle + MAX_MEDIAN * sign * aside]))
-                for index in self._tree.query(ray, predicate="intersects"):
-                    # The other carriageway has the same name and leads the opposite way, within 37 degrees (cosine
-                    # below -0.8). A parallel one-way street of the same direction does not make the space between them
-                    # a median.
-                    ahead = self._stop[index] - self._start[index]
-                    opposite = float(ahead @ along) < -0.8 * float(np.hypot(*ahead))
-                    found[side] |= opposite and self._names[index] == way.tags.get("name", "")
-        return found[0], found[1]
+        middle, along = line[:-1] + steps / 2, steps / np.maximum(np.hypot(*steps.T), 1e-9)[:, None]
+        aside = np.column_stack([-along[:, 1], along[:, 0]])
+
+        def opposite(sign: float) -> bool:
+            # Cast a ray to the side from the middle of each segment: where carriageways part around a refuge, they are
+            # parallel for a few metres only. It starts at 2 m, so as not to meet the street itself.
+            rays = shapely.linestrings(np.stack([middle + by * sign * aside for by in (2.0, MAX_MEDIAN)], axis=1))
+            segment, other = self._tree.query(rays, predicate="intersects")
+            # The other carriageway has the same name and leads the opposite way, within 37 degrees (cosine below -0.8).
+            # A parallel one-way street of the same direction does not make the space between them a median.
+            cosine = (self._along[other] * along[segment]).sum(axis=1)
+            return bool(((cosine < -0.8) & (self._names[other] == way.tags.get("name", ""))).any())
+
+        return opposite(1.0), opposite(-1.0)
 
     def _line(self, way: Way) -> Float:
         """Return the line of a way (n, 2), metres from the extract's first node, in driving direction."""
-        return _in_metres(self._extract, self._extract.line(way))
+        return self._extract.in_metres(self._extract.line(way))
 
 
 def is_link(tags: Tags) -> bool:

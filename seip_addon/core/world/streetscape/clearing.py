@@ -5,7 +5,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import TypeVar
 
-import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
@@ -16,7 +15,6 @@ from .description import Building, Poles, SiteDescription, Slab, Trees, Wall
 CLEARANCE = 4.5  # metres above the road from which on objects may extend over it
 NEAR_EDGE = 3.0  # metres inside the carriageway up to which trees and posts are moved to its edge
 SETBACK = 0.2  # metres that they then stand from it
-AT_EDGE = 1e-6  # metres from the edge below which the direction to it is only that of rounding
 MAX_IN_LANE = 0.5  # metres inside the carriageway up to which a post is taken to stand at its edge
 MIN_OVERLAP, MIN_REST = 0.1, 2.0  # m²: smaller overlaps with the carriageway are ignored, smaller rests left out
 
@@ -40,18 +38,18 @@ def clear(
     description : SiteDescription
         Description to clear.
     carriageway : shapely geometry
-        Carriageway on the studied level, map coordinates.
+        Carriageway on the studied level, in the axes of the description.
     mouths : shapely geometry
-        Lines across it where the road continues, map coordinates.
+        Lines across it where the road continues.
     """
     shapely.prepare(carriageway)
     lanes = carriageway.buffer(-MAX_IN_LANE)
     # Objects move to the sides of the road only, never to the end of the modelled carriageway.
-    edge = without(shapely.boundary(carriageway), mouths.buffer(SETBACK))
+    sides = without(shapely.boundary(carriageway.buffer(SETBACK)), mouths.buffer(2 * SETBACK))
     counted = Counter[str]()
 
     def at_edge(rows: Sequence[Row]) -> tuple[Row, ...]:
-        return tuple(_beside(row, carriageway, edge, counted) for row in rows)
+        return tuple(_beside(row, carriageway, sides, counted) for row in rows)
 
     def posts(rows: Sequence[Poles]) -> tuple[Poles, ...]:
         return at_edge(tuple(_split_at_lanes(rows, lanes, counted)))
@@ -83,26 +81,15 @@ def _split_at_lanes(rows: Sequence[Poles], lanes: BaseGeometry, counted: Counter
         yield replace(row, positions=row.positions[~inside])
 
 
-def _beside(row: Row, carriageway: BaseGeometry, edge: BaseGeometry, counted: Counter[str]) -> Row:
-    """Return a row of trees or posts with those on the carriageway moved to its edge, or left out."""
+def _beside(row: Row, carriageway: BaseGeometry, sides: BaseGeometry, counted: Counter[str]) -> Row:
+    """Return a row of trees or posts with those on the carriageway moved to lines next to it, or left out."""
     inside = shapely.intersects_xy(carriageway, row.positions)
     if row.source == DESCRIBED or not inside.any():
         return row
-    places = row.positions.copy()
-    found = shapely.shortest_line(shapely.points(places[inside]), edge)
-    ways = shapely.get_coordinates(found).reshape(-1, 2, 2)
-    outwards = ways[:, 1] - ways[:, 0]
-    depth = np.hypot(*outwards.T)
-    # The vector to the edge, made longer by the setback. At the edge itself the vector has no direction: there the
-    # nearest point that is set back from the carriageway is taken.
-    places[inside] += outwards * (1.0 + SETBACK / np.maximum(depth, AT_EDGE))[:, None]
-    at_edge = np.flatnonzero(inside)[depth < AT_EDGE]
-    if len(at_edge):
-        set_back = shapely.boundary(carriageway.buffer(SETBACK))
-        nearest = shapely.shortest_line(shapely.points(row.positions[at_edge]), set_back)
-        places[at_edge] = shapely.get_coordinates(nearest).reshape(-1, 2, 2)[:, 1]
-    lost = inside.copy()
-    lost[inside] = depth > NEAR_EDGE
+    places, lost = row.positions.copy(), inside.copy()
+    ways = shapely.shortest_line(shapely.points(places[inside]), sides)
+    places[inside] = shapely.get_coordinates(ways)[1::2]
+    lost[inside] = shapely.length(ways) > NEAR_EDGE + SETBACK
     counted[_DROPPED] += int(lost.sum())
     counted[_MOVED] += int((inside & ~lost).sum())
     return replace(row, positions=places[~lost])

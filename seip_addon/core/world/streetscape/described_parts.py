@@ -12,44 +12,32 @@ from ...geometry.solids import fence
 from ...site.roles import Role
 from ...site.scene_geometry import DESCRIBED
 from . import street_furniture
-from .description import (
-    Building,
-    Poles,
-    SiteDescription,
-    Slab,
-    Trees,
-    Wall,
-)
-from .map_furniture import (
-    POLE_HEIGHT,
-    POST_RADIUS,
-    arm_heading,
-    building_parts,
-    facade,
-    pole_part,
-    tree_part,
-)
+from .description import Building, Poles, SiteDescription, Slab, Trees, Wall
+from .map_furniture import POLE_HEIGHT, POST_RADIUS, arm_heading, building_parts, facade, pole_part, tree_part
 from .parts import Part
 from .site_ground import SiteGround
 
 
 def described_parts(description: SiteDescription, street: SiteGround) -> list[Part]:
     """Return the parts of a description in local axes, standing on the ground."""
+    names = Counter[str]()
+
+    def numbered(name: str) -> str:
+        names[name] += 1
+        return f"{name} {names[name]}"
+
     parts: list[Part] = []
     for number, building in enumerate(description.buildings, start=1):
-        parts += _building_parts(building, number, street)
-    names = Counter[str]()
-    parts += _solid_parts(description)
+        parts += _building_parts(building, numbered("Building"), number, street)
+    parts += [Part(numbered(one.name), one.solid, (Role.OCCLUDERS,), source=one.source) for one in description.solids]
     for wall in description.walls:
-        names[wall.name] += 1
         foot = _on_ground(wall.line, street) + np.array([0.0, 0.0, wall.base])
         panels = fence(foot, np.full(len(foot), wall.height), wall.thickness, side=wall.material)
-        parts.append(_with_item_source(Part(f"{wall.name} {names[wall.name]}", panels, (Role.OCCLUDERS,)), wall))
+        parts.append(_with_item_source(Part(numbered(wall.name), panels, (Role.OCCLUDERS,)), wall))
     for slab in description.slabs:
-        names[slab.name] += 1
         ground = float(street.terrain.height(shapely.get_coordinates(slab.outline)).min())
         plate = street_furniture.house(slab.outline, ground + slab.base, ground + slab.top, side=slab.material)
-        parts.append(_with_item_source(Part(f"{slab.name} {names[slab.name]}", plate, (Role.OCCLUDERS,)), slab))
+        parts.append(_with_item_source(Part(numbered(slab.name), plate, (Role.OCCLUDERS,)), slab))
     trees = [(foot, row) for row in description.trees for foot in _on_ground(row.positions, street)]
     parts += [
         _with_item_source(tree_part(f"Tree {number}", foot, row.height, row.crown_diameter, number), row)
@@ -59,23 +47,15 @@ def described_parts(description: SiteDescription, street: SiteGround) -> list[Pa
     return parts
 
 
-def _building_parts(building: Building, number: int, street: SiteGround) -> list[Part]:
+def _building_parts(building: Building, name: str, number: int, street: SiteGround) -> list[Part]:
     plan = shapely.get_coordinates(building.outline.exterior)[:-1]
     ground = float(street.terrain.height(plan).min()) + building.base
     base = np.column_stack([plan, np.full(len(plan), ground)])
     shape = None
     if building.outline.interiors:
         shape = street_furniture.house(building.outline, ground, ground + building.height, side=facade(number))
-    made = building_parts(f"Building {number}", base, np.full(len(plan), building.height), number, shape)
+    made = building_parts(name, base, np.full(len(plan), building.height), number, shape)
     return [_with_item_source(part, building) for part in made]
-
-
-def _solid_parts(description: SiteDescription) -> Iterator[Part]:
-    """Yield the solids of separate files, numbered by name."""
-    numbers = Counter[str]()
-    for one in description.solids:
-        numbers[one.name] += 1
-        yield Part(f"{one.name} {numbers[one.name]}", one.solid, (Role.OCCLUDERS,), source=one.source)
 
 
 def _with_item_source(part: Part, item: Building | Wall | Slab | Trees | Poles) -> Part:

@@ -17,7 +17,7 @@ from ...geometry.plan import covered_share
 from ...geometry.solids import Solid
 from ...site.post_rules import KeepOffArea, RuleName
 from ...site.scene_geometry import DESCRIBED, FROM_EXTRACT, FROM_MAP
-from .terrain import FlatLand, Relief
+from .terrain import Relief
 
 DEFAULT_RADIUS = 80.0
 
@@ -224,14 +224,10 @@ class SiteDescription:
     keep_off_areas : tuple of KeepOffArea
         Areas from which rules exclude new posts, map coordinates.
     relief : Relief or None
-        Ground under the map, which is flat.
-    flat_land : FlatLand or None
-        Level land next to ramps and underpasses; None if the map does not give the height of the land.
-    from_centre_lines : bool
-        Whether the map was made from centre lines of streets: then junctions within `JUNCTION_REACH` metres of each
-        other are one, and small holes between their lanes are not islands.
+        Ground under the map, which is flat, or level land next to ramps and underpasses; None if the height of the
+        land is unknown.
     roundabouts : tuple of frozenset of str
-        Junction ids of each roundabout, in a map made from centre lines.
+        Junction ids of each roundabout in a network.
     map_source : str
         Source of the roads.
     widths_assumed : frozenset of str
@@ -262,8 +258,6 @@ class SiteDescription:
     solids: tuple[PlacedSolid, ...] = ()
     keep_off_areas: tuple[KeepOffArea, ...] = ()
     relief: Relief | None = None
-    flat_land: FlatLand | None = None
-    from_centre_lines: bool = False
     roundabouts: tuple[frozenset[str], ...] = ()
     map_source: str = FROM_MAP
     widths_assumed: frozenset[str] = frozenset()

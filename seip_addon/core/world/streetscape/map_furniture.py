@@ -1,6 +1,5 @@
 """Objects of a map as parts of the site: buildings, trees, walls, posts and street lights."""
 
-import dataclasses
 import math
 from collections.abc import Iterable, Iterator
 
@@ -102,11 +101,6 @@ def _extended(corners: Float, side: Float) -> BaseGeometry:
     return shapely.MultiPoint(np.concatenate([corners + by, corners - by])).convex_hull
 
 
-def local_objects(objects: Iterable[PlacedObject], origin: Float) -> tuple[PlacedObject, ...]:
-    """Return objects in local axes, whose origin (3,) is given in map coordinates."""
-    return tuple(_local(placed, origin) for placed in objects)
-
-
 def is_trunk(placed: PlacedObject) -> bool:
     """Return whether what a map gives as the size of a tree can be no more than its trunk."""
     height, size = height_of(placed) or TREE_HEIGHT, size_of(placed)
@@ -122,11 +116,6 @@ def can_carry(post: Post) -> bool:
 def pole_part(name: str, shape: Solid, foot: Float, heading: float, source: str) -> Part:
     """Return a post that can carry a sensor, with its arm at a heading; for ``source`` see `Part`."""
     return Part(name, shape, (Role.POLES,), _xyz(foot), heading, source=source)
-
-
-def _local(placed: PlacedObject, origin: Float) -> PlacedObject:
-    outlines = tuple(dataclasses.replace(outline, base=outline.base - origin) for outline in placed.outlines)
-    return dataclasses.replace(placed, position=placed.position - origin, outlines=outlines)
 
 
 def _object(placed: PlacedObject, number: int, carriageway: BaseGeometry) -> tuple[Part, ...]:

@@ -2,7 +2,7 @@
 
 from collections.abc import Generator, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 import shapely
@@ -14,36 +14,17 @@ from ...errors import SeipError
 from ...geometry.plan import covered_share, united, without
 from ...geometry.solids import Solid
 from ...progress import Progress
-from ...site.obstruction import NO_OBSTACLES_MESSAGE, can_hide
-from ...site.post_rules import RULES, KeepOffArea
+from ...site.post_rules import RULES
 from ...site.roles import AREA_OVERLAYS, Role
 from ...site.scene_geometry import ASSUMED, NamedArea
 from ...site.sources import SourceCount, count_sources
 from ..opendrive.objects import TUNNEL, PlacedObject, PlacedSignal, extent_in_plan
 from .clearing import clear
 from .described_parts import described_parts
-from .description import (
-    MAX_COVERED,
-    PLACED_FIELDS,
-    Area,
-    Building,
-    PlacedSolid,
-    Poles,
-    SideWay,
-    SiteDescription,
-    Slab,
-    Trees,
-    Wall,
-)
+from .description import MAX_COVERED, PLACED_FIELDS, SiteDescription
 from .intersections import ring_roads
 from .levels import MIN_LEVEL_HEIGHT, UNNAMED_ROAD, Levels
-from .map_furniture import (
-    CROWN_SHARE,
-    is_trunk,
-    landings,
-    local_objects,
-    object_parts,
-)
+from .map_furniture import CROWN_SHARE, is_trunk, landings, object_parts
 from .named_places import area_in_plan, named_places, street_names
 from .object_kinds import Kind, kind_of
 from .parts import Part
@@ -69,9 +50,6 @@ from .terrain import Relief
 STEPS = ("place", "ground", "objects", "carriageway", "pavements", "verge", "checks")
 """Steps of `street_model` in their order."""
 UNNAMED_STREET = "Unnamed street"
-
-
-_Item = TypeVar("_Item", Area, Building, KeepOffArea, PlacedSolid, Poles, SideWay, Slab, Trees, Wall)
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,13 +129,13 @@ def street_model(streets: StreetMap, description: SiteDescription) -> Generator[
     region = place.region()
     origin = _origin(place, description.relief)
     yield _step("ground")
-    street = site_ground(streets, levels, origin, shifted(region, -origin), description)
-    yield _step("objects")
     # From here on in local axes: objects of the description and of the map.
-    described, clear_notes = _local_description(description, street)
+    described = _local_description(description, origin)
+    street = site_ground(streets, levels, origin, shifted(region, -origin), described)
+    yield _step("objects")
+    described, clear_notes = clear(described, street.roadside.carriageway, street.roadside.mouths)
     objects, covered_notes = _without_covered(_map_objects(streets, street), described)
     furniture = _furniture(objects, _map_signals(streets, street, levels), described, street)
-    other_levels = other_level_parts(street)
     yield _step("carriageway")
     surface = street_surface(street)
     yield _step("pavements")
@@ -167,19 +145,18 @@ def street_model(streets: StreetMap, description: SiteDescription) -> Generator[
     parts = [
         *laid,
         verge_part(street, furniture.parts, laid),
-        *other_levels,
+        *other_level_parts(street),
         marking_part(street, has_signals=bool(furniture.signals or described.signal_poles)),
         *furniture.parts,
         *_overlay_parts(place, described, objects, street),
     ]
     yield _step("checks")
+    in_junction = description.junction and f"junction {description.junction}"
     names = street_names(road_map)
-    seen = _sight_area(street.region, parts)
-    bare = () if any(_hides(part, seen) for part in (*furniture.parts, *other_levels)) else (NO_OBSTACLES_MESSAGE,)
-    unnamed = UNNAMED_ROAD if description.from_centre_lines else ""
+    unnamed = UNNAMED_ROAD if streets.junctions else ""
     warnings = road_warnings(road_map, (*street.lanes, *street.crossing.lanes), names, origin, unnamed)
     return SiteModel(
-        name=description.name or _map_title(road_map.name, description.junction),
+        name=description.name or ", ".join(filter(None, (road_map.name, in_junction))),
         origin=origin,
         geo_reference=road_map.geo_reference,
         header_offset=road_map.header_offset,
@@ -193,13 +170,13 @@ def street_model(streets: StreetMap, description: SiteDescription) -> Generator[
             *_furniture_notes(objects, furniture.signals),
             *_tunnel_notes(objects, names),
         ),
-        warnings=(*bare, *warnings),
+        warnings=warnings,
         places=named_places(
             street.lanes,
             names,
             objects,
             street.region,
-            unnamed=UNNAMED_STREET if description.from_centre_lines else "",
+            unnamed=UNNAMED_STREET if streets.junctions else "",
             rings=ring_roads(road_map.roads, description.roundabouts),
         ),
         attribution=tuple(dict.fromkeys((*road_map.attribution, *description.attribution))),
@@ -210,21 +187,15 @@ def _step(name: str) -> Progress:
     return Progress(STEPS.index(name), len(STEPS), "streets", counted=False)
 
 
-def _local_description(description: SiteDescription, street: SiteGround) -> tuple[SiteDescription, tuple[str, ...]]:
-    """Return a description with the carriageway cleared and its objects and areas in local axes, and notes.
-
-    The choice of the place (``near``, ``region``, weighted regions) and the ground remain in map coordinates: `Place`
-    and `SiteGround` have used them before.
-    """
-    on_map = (shifted(area, street.origin) for area in (street.roadside.carriageway, street.roadside.mouths))
-    cleared, notes = clear(description, *on_map)
+def _local_description(description: SiteDescription, origin: Float) -> SiteDescription:
+    """Return a description with objects and areas in local axes; the place and the ground stay as they are."""
     local: dict[str, Any] = {
-        name: tuple(_local(one, street.origin) for one in getattr(cleared, name)) for name in PLACED_FIELDS
+        name: tuple(_local(one, origin) for one in getattr(description, name)) for name in PLACED_FIELDS
     }
-    return replace(cleared, **local), notes
+    return replace(description, **local)
 
 
-def _local(item: _Item, origin: Float) -> _Item:
+def _local(item: Any, origin: Float) -> Any:  # noqa: ANN401  # of any dataclass in a description
     """Return an object or area of a description in local axes: all that is a shape or an array of places in it."""
     moved: dict[str, Any] = {}
     for name, value in vars(item).items():
@@ -240,8 +211,9 @@ def _local(item: _Item, origin: Float) -> _Item:
 def _map_objects(streets: StreetMap, street: SiteGround) -> tuple[PlacedObject, ...]:
     """Return the objects of the map within the extent, on the ground, in local axes."""
     area = shifted(street.extent, street.origin)
-    on_map = (_risen(one, street.relief) for one in streets.objects if extent_in_plan(one).intersects(area))
-    return local_objects(on_map, street.origin)
+    near = (one for one in streets.road_map.objects if extent_in_plan(one).intersects(area))
+    # An object is raised as a whole by the ground under its position.
+    return tuple(one.moved(on_relief(one.position, street.relief) - one.position - street.origin) for one in near)
 
 
 def _map_signals(streets: StreetMap, street: SiteGround, levels: Levels) -> list[PlacedSignal]:
@@ -249,7 +221,7 @@ def _map_signals(streets: StreetMap, street: SiteGround, levels: Levels) -> list
     away, area = levels.other_roads(), shifted(street.extent, street.origin)
     return [
         replace(one, position=on_relief(one.position, street.relief) - street.origin)
-        for one in streets.signals
+        for one in streets.road_map.signals
         if one.road_id not in away and area.intersects(shapely.Point(one.position[:2]))
     ]
 
@@ -288,20 +260,6 @@ def _overlay_parts(
     ]
 
 
-def _sight_area(region: BaseGeometry, parts: Sequence[Part]) -> BaseGeometry:
-    """Return the area in plan that lies between positions of sensors and the region of interest, local axes."""
-    posts = [part.foot[:2] for part in parts if Role.POLES in part.roles]
-    return shapely.union_all([region.buffer(CANDIDATE_MARGIN), shapely.MultiPoint(posts)]).convex_hull
-
-
-def _hides(part: Part, area: BaseGeometry) -> bool:
-    """Return whether an occluder reaches into an area and is large enough to hide targets there."""
-    if Role.OCCLUDERS not in part.roles:
-        return False
-    plan = shapely.MultiPoint(part.solid.vertices[:, :2] + part.foot[:2]).convex_hull
-    return can_hide(part.solid.vertices) and bool(area.intersects(plan))
-
-
 def _without_covered(
     objects: tuple[PlacedObject, ...], described: SiteDescription
 ) -> tuple[tuple[PlacedObject, ...], tuple[str, ...]]:
@@ -310,19 +268,14 @@ def _without_covered(
     if not modelled:
         return objects, ()
     tree = shapely.STRtree(modelled)
-    kept = tuple(one for one in objects if kind_of(one) is not Kind.BUILDING or not _is_covered(one, tree))
+    kept = tuple(
+        one
+        for one in objects
+        if kind_of(one) is not Kind.BUILDING or covered_share(area_in_plan(one), tree) <= MAX_COVERED
+    )
     count = len(objects) - len(kept)
     note = f"{counted(count, 'building')} of the map replaced by those of the survey"
     return kept, (note,) if count else ()
-
-
-def _is_covered(placed: PlacedObject, modelled: shapely.STRtree) -> bool:
-    return covered_share(area_in_plan(placed), modelled) > MAX_COVERED
-
-
-def _map_title(name: str, junction: str | None) -> str:
-    """Return the title of a site without a description: the map, and the junction that was asked for."""
-    return ", ".join(filter(None, (name, junction and f"junction {junction}")))
 
 
 def _with_source(part: Part, description: SiteDescription) -> Part:
@@ -380,16 +333,6 @@ def _origin(place: Place, relief: Relief | None) -> Float:
     return np.round([*place.centre, on_relief(nearest, relief)[2]])
 
 
-def _risen(placed: PlacedObject, relief: Relief | None) -> PlacedObject:
-    """Return an object of a map, raised as a whole by the ground under its position."""
-    if relief is None:
-        return placed
-    position = on_relief(placed.position, relief)
-    rise = position - placed.position
-    outlines = tuple(replace(one, base=one.base + rise) for one in placed.outlines)
-    return replace(placed, position=position, outlines=outlines)
-
-
 def _weighted_parts(
     areas: Sequence[tuple[str, BaseGeometry, float]], street: SiteGround, *, described: bool
 ) -> Iterator[Part]:
@@ -410,12 +353,12 @@ def _area_parts(description: SiteDescription, street: SiteGround) -> list[Part]:
 def _keep_off_parts(description: SiteDescription, placed: Sequence[PlacedObject], street: SiteGround) -> Iterator[Part]:
     """Yield the areas from which rules exclude new posts, cut to the surroundings of the region.
 
-    Landings at the crossings of the map are added unless it was made from centre lines: netconvert guesses crossings.
+    Landings at the crossings of the map are added unless it is a network: netconvert guesses crossings.
     """
     areas = [(one.rule, one.polygon) for one in description.keep_off_areas]
     if street.areas is not None:
         areas.append(("islands", medians(street.roadside)))
-    if not description.from_centre_lines:
+    else:
         areas += [("landings", landing) for landing in landings(placed)]
     near = without(street.region.buffer(CANDIDATE_MARGIN), street.roadside.carriageway)
     for number, (rule, about) in enumerate(RULES.items()):

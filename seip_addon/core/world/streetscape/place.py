@@ -19,14 +19,7 @@ from ..opendrive.road_map import Junction, RoadMap
 from . import road_surface
 from .approaches import approach_lanes
 from .description import DEFAULT_RADIUS, SiteDescription
-from .intersections import (
-    JUNCTION_REACH,
-    box_along,
-    intersection,
-    leads_between,
-    ring_roads,
-    with_other_carriageways,
-)
+from .intersections import JUNCTION_REACH, box_along, intersection, leads_between, ring_roads, with_other_carriageways
 from .levels import Levels, split_levels
 from .named_places import street_names
 from .street_areas import GAP as JUNCTION_GAP
@@ -51,7 +44,8 @@ class Place:
     description : SiteDescription
         Choice of the place and its region.
     junctions : tuple of JunctionArea
-        Areas of the junctions of a network.
+        Areas of the junctions of a network, which was made from centre lines of streets: junctions within
+        `JUNCTION_REACH` metres of each other are one place there. Empty for OpenDRIVE.
     """
 
     road_map: RoadMap
@@ -84,9 +78,9 @@ class Place:
             return shapely.Point(self.centre).buffer(self.description.radius or DEFAULT_RADIUS, quad_segs=32)
         lanes = self._approach_lanes()
         self._check_spread(lanes)
-        if self.description.from_centre_lines:
+        if self.junctions:
             driving = road_surface.in_groups(self.surfaces, ["driving"])
-            return with_other_carriageways(lanes, driving, self._names).convex_hull
+            return with_other_carriageways(lanes, driving, self.road_map.names).convex_hull
         return shapely.union_all([shapely.make_valid(lane.polygon) for lane in lanes]).convex_hull
 
     def _check_spread(self, lanes: Sequence[LaneSurface]) -> None:
@@ -126,8 +120,8 @@ class Place:
         driving = road_surface.in_groups(lanes, ["driving"])
         near = road_surface.local_strips(driving, shift, within) if driving else ()
         if near:
-            outline = road_surface.without_small_holes(road_surface.lane_outline(near))
-            if self.description.from_centre_lines:
+            outline = road_surface.without_holes(road_surface.lane_outline(near), least=road_surface.MAX_HOLE)
+            if self.junctions:
                 outline = self._whole_streets(near, shift)
             region = road_surface.without_crumbs(outline.intersection(within))
             if not region.is_empty:
@@ -142,15 +136,17 @@ class Place:
         around = self.within.convex_hull.buffer(SCENE_MARGIN)
         driving = road_surface.in_groups(self.surfaces, ["driving"])
         nearby = road_surface.local_strips(driving, shift, shifted(around, -shift))
-        area = with_other_carriageways(lanes, nearby, self._names)
+        area = with_other_carriageways(lanes, nearby, self.road_map.names)
         there = {lane.road_id for lane in nearby}
         joined = [one for one in self.junctions if there & one.roads]
         junctions = [shifted(one.carriageway, -shift) for one in joined]
-        widened = [one.road for one in tapers(nearby, joined, {road.id: road for road in self.road_map.roads})]
+        widened = [one.road for one in tapers(nearby, joined, self.road_map.roads)]
         inside = [one for one in junctions if one.intersection(area).area > MIN_SHARE_OF_JUNCTION * one.area]
         whole = closed(united([area, *inside]).simplify(TOLERANCE), JUNCTION_GAP)
-        names = {"", *(self._names.get(lane.road_id, "") for lane in lanes)}
-        roads = [own for road, own in road_surface.by_road(nearby).items() if self._names.get(road, "") in names]
+        names = {"", *(self.road_map.names.get(lane.road_id, "") for lane in lanes)}
+        roads = [
+            own for road, own in road_surface.by_road(nearby).items() if self.road_map.names.get(road, "") in names
+        ]
         links = [own for own in roads if all(leads_between(lane, whole) for lane in own)]
         whole = united([whole, *(lane.polygon for own in links for lane in own)])
         whole = united([whole, *(one for one in widened if one.intersection(whole.buffer(JUNCTION_GAP)).length > 0)])
@@ -174,23 +170,25 @@ class Place:
         ]
 
     def _title(self, junction: Junction) -> str:
-        """Return the title of a junction: its streets in a map made from centre lines, otherwise its id."""
-        name = self.description.name if self.description.from_centre_lines else ""
+        """Return the title of a junction: its streets in a network, otherwise its id."""
+        name = self.description.name if self.junctions else ""
         return name if name.startswith("Junction ") else f"Junction {name or junction.id}"
 
     def _lanes_of_region(self) -> Sequence[LaneSurface]:
         """Return the lanes that the region of interest may lie on.
 
-        In a map made from centre lines, a circle around a junction excludes streets that only pass by.
+        In a network, a circle around a junction excludes streets that only pass by.
         """
         description = self.description
         if description.along is not None:
             return self._approach_lanes()
-        if description.from_centre_lines and description.near is not None:
+        if self.junctions and description.near is not None:
             nearest = nearest_junctions(self.road_map, self.surfaces, float(self.centre[0]), float(self.centre[1]), 1)
             if nearest and nearest[0][1] <= JUNCTION_REACH:
                 junctions = self._one_place(nearest[0][0])
-                return approach_lanes(self.surfaces, junctions, description.radius or DEFAULT_RADIUS, self._names)
+                return approach_lanes(
+                    self.surfaces, junctions, description.radius or DEFAULT_RADIUS, self.road_map.names
+                )
         return self.surfaces
 
     @cached_property
@@ -203,7 +201,7 @@ class Place:
         return self._one_place(self._junction)
 
     def _one_place(self, junction: Junction) -> frozenset[str]:
-        if not self.description.from_centre_lines:
+        if not self.junctions:
             return frozenset({junction.id})
         return intersection(self.surfaces, junction.id, self.description.roundabouts)
 
@@ -211,13 +209,8 @@ class Place:
         return find_junction(self.road_map, self.surfaces, id_or_name)
 
     def _approach_lanes(self) -> tuple[LaneSurface, ...]:
-        names = self._names if self.description.from_centre_lines else None
+        names = self.road_map.names if self.junctions else None
         return approach_lanes(self.surfaces, self._junctions, self.description.along or 0.0, names)
-
-    @cached_property
-    def _names(self) -> dict[str, str]:
-        """Names of the streets by the ids of their roads."""
-        return {road.id: road.name for road in self.road_map.roads}
 
     def _driving_area(self, junction: Junction) -> BaseGeometry:
         driving = road_surface.in_groups(self.surfaces, ["driving"])
@@ -227,7 +220,7 @@ class Place:
 
     def _central_box(self, junction: Junction) -> BaseGeometry:
         """Return the smallest rectangle around a junction's driving lanes, aligned with its roads if possible."""
-        if self.description.from_centre_lines:
+        if self.junctions:
             driving = road_surface.in_groups(self.surfaces, ["driving"])
             ring = ring_roads(self.road_map.roads, self.description.roundabouts, self._one_place(junction))
             around = [shapely.make_valid(lane.polygon) for lane in driving if lane.road_id in ring]

@@ -104,10 +104,10 @@ def roadside(surfaces: Sequence[LaneSurface], carriageway: BaseGeometry | None =
     carriageway = lane_outline(paved) if carriageway is None else carriageway
     junctions = sorted({lane.junction_id for lane in paved if lane.junction_id is not None})
     inside = [lane_outline([lane for lane in paved if lane.junction_id == junction]) for junction in junctions]
-    whole = shapely.union_all([carriageway, *map(_without_holes, inside)])
+    whole = shapely.union_all([carriageway, *map(without_holes, inside)])
     # Morphological closing fills gaps between carriageways that are open at an end, and therefore not holes.
     medians = without(closed(whole, MAX_OPEN_MEDIAN_WIDTH / 2, join), whole)
-    filled = _without_holes(closed(whole.union(medians), MAX_SEAM), least=MAX_ISLAND_AREA, narrow=MAX_MEDIAN_WIDTH)
+    filled = without_holes(closed(whole.union(medians), MAX_SEAM), least=MAX_ISLAND_AREA, narrow=MAX_MEDIAN_WIDTH)
     # A lane that ends at the edge of the filled area leads out of the model: there the edge is not a side of the road.
     # Ends of lanes where another lane follows lie inside, and only touch the edge with a corner.
     ends = [lane.left[[row], :2].tolist() + lane.right[[row], :2].tolist() for lane in paved for row in (0, -1)]
@@ -144,17 +144,12 @@ def side_pieces(roadside: Roadside) -> tuple[Float, Float, Float]:
     return start, stop, np.where(inner[:, None], -aside, aside)
 
 
-def without_small_holes(area: BaseGeometry, least: float = MAX_HOLE) -> BaseGeometry:
-    """Return an area of lanes without the small holes, in m², that these leave between them in junctions."""
-    return _without_holes(area, least=least)
-
-
 def without_gaps(roadside: Roadside, surfaces: Sequence[LaneSurface]) -> BaseGeometry:
     """Return the holes of the carriageway that are too small for islands.
 
     These are gaps between turning lanes in a junction that no lane of a different kind covers.
     """
-    holes = without(without_small_holes(roadside.carriageway), roadside.carriageway)
+    holes = without(without_holes(roadside.carriageway, least=MAX_HOLE), roadside.carriageway)
     return holes if holes.is_empty else without(holes, _plan(in_groups(surfaces, NOT_DRIVEN)))
 
 
@@ -164,7 +159,7 @@ def _is_corner(notch: BaseGeometry, kerb: BaseGeometry, walked: BaseGeometry) ->
     return bool(kerb.intersection(along).length <= MAX_CORNER and walked.intersection(along).length <= MAX_ENDS)
 
 
-def _without_holes(area: BaseGeometry, *, least: float = np.inf, narrow: float = 0.0) -> BaseGeometry:
+def without_holes(area: BaseGeometry, *, least: float = np.inf, narrow: float = 0.0) -> BaseGeometry:
     """Return the area without holes smaller than ``least`` m² (all by default) or narrower than ``narrow`` metres."""
 
     def kept(hole: shapely.LinearRing) -> bool:
@@ -193,7 +188,11 @@ def local_strips(
         Whether pavements are raised that are level with the road in the map.
     """
     shapely.prepare(area)
-    moved = (_moved(surface, origin) for surface in surfaces if surface.lane_type in GROUPS)
+    moved = (
+        dataclasses.replace(surface, left=surface.left - origin, right=surface.right - origin)
+        for surface in surfaces
+        if surface.lane_type in GROUPS
+    )
     near = [surface for surface in moved if is_near(surface, area)]
     trimmed = (_trimmed(_densified(surface), area) for surface in (_with_kerbs(near) if kerbs else near))
     return tuple(surface for surface in trimmed if len(surface.left) > 1)
@@ -263,7 +262,7 @@ def lane_outline(surfaces: Iterable[LaneSurface]) -> BaseGeometry:
 def without_crumbs(area: BaseGeometry, least: float = 0.5) -> BaseGeometry:
     """Return the area without parts and holes smaller than ``least`` square metres."""
     parts = [part for part in shapely.get_parts(area) if part.area >= least]
-    return _without_holes(shapely.geometrycollections(parts), least=least)
+    return without_holes(shapely.geometrycollections(parts), least=least)
 
 
 class SurfaceLayers:
@@ -419,10 +418,6 @@ def _with_kerbs(surfaces: Sequence[LaneSurface]) -> tuple[LaneSurface, ...]:
 
 def _plan(surfaces: Iterable[LaneSurface]) -> BaseGeometry:
     return shapely.union_all([shapely.make_valid(surface.polygon) for surface in surfaces], grid_size=SNAP_GRID)
-
-
-def _moved(surface: LaneSurface, origin: Float) -> LaneSurface:
-    return dataclasses.replace(surface, left=surface.left - origin, right=surface.right - origin)
 
 
 def _densified(surface: LaneSurface) -> LaneSurface:

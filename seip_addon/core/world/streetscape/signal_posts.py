@@ -59,16 +59,15 @@ def split_posts(
     others : list of PlacedObject
         Objects that carry no signal.
     lights : list of (PlacedSignal, Post or None)
-        Dynamic signals, each with its post.
+        Signals, each with its post.
     """
     posts = [(number, post) for number, placed in enumerate(objects) if (post := post_of(placed)) is not None]
     used: set[int] = set()
     lights: list[tuple[PlacedSignal, Post | None]] = []
     for signal in signals:
-        if signal.dynamic:
-            number, own = _own_post(signal, posts, roadside)
-            used |= {number} if own else set()
-            lights.append((signal, own))
+        number, own = _own_post(signal, posts, roadside)
+        used |= {number} if own else set()
+        lights.append((signal, own))
     return [placed for number, placed in enumerate(objects) if number not in used], lights
 
 

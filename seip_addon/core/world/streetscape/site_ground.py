@@ -13,16 +13,14 @@ from ...geometry.plan import outline, united, without
 from ..opendrive.lanes import LaneSurface
 from . import road_surface
 from .clearing import MAX_IN_LANE
-from .description import (
-    SiteDescription,
-)
+from .description import SiteDescription
 from .intersections import enclosed, ring_roads
 from .levels import MIN_LEVEL_HEIGHT, Levels
 from .place import SCENE_MARGIN, shifted
 from .road_surface import Roadside
-from .street_areas import NOTHING, Sidewalk, StreetAreas, street_areas
-from .street_map import JunctionArea, StreetMap
-from .terrain import Embankments, FlatLand, Relief, Terrain, cut, embankment_width
+from .street_areas import NOTHING, StreetAreas, street_areas
+from .street_map import StreetMap
+from .terrain import Embankments, Relief, Terrain, cut, embankment_width
 
 MIN_PASSAGE = 2.0  # metres above the ground from which on a building leaves room for ways below
 MIN_BRIDGE_HEIGHT = 1.0  # metres above the land from which a road on a bridge is in the air
@@ -56,11 +54,6 @@ class OtherLevels:
         """Area in plan of the roads of other levels on the ground."""
         return outline(self.on_ground, road_surface.SNAP_GRID)
 
-    @cached_property
-    def off_posts(self) -> BaseGeometry:
-        """Area in plan next to which the verge is not used for posts."""
-        return self.area.union(self.decks)
-
 
 @dataclass(frozen=True, eq=False)
 class SiteGround:
@@ -88,8 +81,7 @@ class SiteGround:
     terrain: Terrain
     ground: Terrain
     relief: Relief | None
-    land: Relief | FlatLand | None
-    crossing: "OtherLevels"
+    crossing: OtherLevels
 
     @cached_property
     def covered(self) -> BaseGeometry:
@@ -119,34 +111,31 @@ def site_ground(
     region : shapely geometry
         Region of interest, local axes.
     description : SiteDescription
-        Objects there and the ground, map coordinates.
+        Objects there, local axes, and the ground.
     """
     extent, relief = region.convex_hull.buffer(SCENE_MARGIN, quad_segs=16), description.relief
     lanes = _strips(levels.studied, origin, extent, relief)
-    if description.from_centre_lines:
+    if streets.junctions:
         lanes = road_surface.without_loose_ends(lanes, region, extent)
     others = _strips(levels.others, origin, extent, relief, kerbs=False)
-    houses = _built_up(streets, lanes, origin, description) if streets.junctions else NOTHING
+    houses = _built_up(streets, lanes, description) if streets.junctions else NOTHING
     areas = _network_areas(streets, lanes, origin, extent, description, houses) if streets.junctions else None
     roadside = road_surface.roadside(lanes) if areas is None else areas.roadside
     shapely.prepare(roadside.carriageway)
-    land = description.relief or description.flat_land
-    terrain, ground, crossing = _ground(levels, lanes, others, origin, land)
+    terrain, ground, crossing = _ground(levels, lanes, others, origin, relief)
     beyond = shapely.box(*extent.buffer(10 * road_surface.MAX_STEP).bounds).difference(extent)
     above, below, on_ground = (cut(part, beyond) for part in (crossing.above, crossing.below, crossing.on_ground))
     crossing = replace(crossing, above=above, below=below, on_ground=on_ground)
-    return SiteGround(origin, lanes, areas, houses, region, extent, roadside, terrain, ground, relief, land, crossing)
+    return SiteGround(origin, lanes, areas, houses, region, extent, roadside, terrain, ground, relief, crossing)
 
 
-def _built_up(
-    streets: StreetMap, lanes: Sequence[LaneSurface], origin: Float, description: SiteDescription
-) -> BaseGeometry:
+def _built_up(streets: StreetMap, lanes: Sequence[LaneSurface], description: SiteDescription) -> BaseGeometry:
     """Return the area of buildings on the ground and of the islands of roundabouts, local axes."""
     outlines = [one.outline for one in description.buildings if one.base < MIN_PASSAGE]
     outlines += [one.outline for one in description.solids]
     rings = ring_roads(streets.road_map.roads, description.roundabouts)
     islands = enclosed([lane.polygon for lane in lanes if lane.road_id in rings])
-    return united([islands, *(shifted(one, -origin) for one in outlines)])
+    return united([islands, *outlines])
 
 
 def _network_areas(
@@ -158,15 +147,12 @@ def _network_areas(
     built_up: BaseGeometry,
 ) -> StreetAreas:
     """Return the areas of the streets of a network, local axes."""
-    sidewalks = [Sidewalk(one.line - origin[:2], one.width) for one in description.ways if one.line is not None]
-    junctions = (_local_junction(one, origin) for one in streets.junctions)
+    junctions = (
+        replace(one, carriageway=shifted(one.carriageway, -origin), walking=shifted(one.walking, -origin))
+        for one in streets.junctions
+    )
     near = [one for one in junctions if extent.intersects(one.carriageway)]
-    return street_areas(lanes, near, {road.id: road for road in streets.road_map.roads}, sidewalks, built_up)
-
-
-def _local_junction(junction: JunctionArea, origin: Float) -> JunctionArea:
-    carriageway, walking = (shifted(area, -origin) for area in (junction.carriageway, junction.walking))
-    return replace(junction, carriageway=carriageway, walking=walking)
+    return street_areas(lanes, near, streets.road_map.roads, description.ways, built_up)
 
 
 def _strips(
@@ -219,7 +205,7 @@ def _ground(
     lanes: tuple[LaneSurface, ...],
     others: tuple[LaneSurface, ...],
     origin: Float,
-    land: Relief | FlatLand | None,
+    land: Relief | None,
 ) -> tuple[Terrain, Terrain, OtherLevels]:
     """Return the terrain of the studied roads, the ground next to and below them, and the roads of other levels.
 
@@ -233,7 +219,7 @@ def _ground(
         return terrain, terrain, OtherLevels(others, away[above], away[~above], away[~above], shapely.Polygon())
 
     def height(xy: Float) -> Float:
-        local: Float = land.at(xy + origin[:2]) - origin[2]
+        local: Float = land.raster.at(xy + origin[:2]) - origin[2]
         return local
 
     # A bridge over level land has its ends on the ground; only roads that rise above it somewhere are in the air.

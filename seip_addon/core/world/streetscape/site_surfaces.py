@@ -13,11 +13,7 @@ from ...geometry.solids import from_faces
 from ...site.roles import AREA_OVERLAYS, Role
 from ...site.scene_geometry import OTHER_LEVELS
 from . import road_surface
-from .description import (
-    Building,
-    PlacedSolid,
-    SiteDescription,
-)
+from .description import Building, PlacedSolid, SiteDescription
 from .lane_markings import markings, stop_lines
 from .parts import Part
 from .road_surface import SNAP_GRID, SurfaceLayers, without_crumbs
@@ -72,11 +68,10 @@ def street_surface(street: SiteGround) -> StreetSurface:
 
 
 def _network_surface(street: SiteGround, areas: StreetAreas) -> StreetSurface:
-    groups = dict(areas.groups)
     terrain = Terrain(triangles_of(road_surface.in_groups(street.lanes, road_surface.CARRIAGEWAY)))
     laid = {
         group: terrain.drape(without_crumbs(area.intersection(street.extent)), spacing=OVERLAY_SPACING)
-        for group, area in groups.items()
+        for group, area in areas.groups.items()
     }
     pavement = without_crumbs(areas.pavement.intersection(street.extent))
     triangles = terrain.drape(pavement, spacing=OVERLAY_SPACING, above=road_surface.KERB_HEIGHT)
@@ -128,7 +123,7 @@ def _pavements(street: SiteGround, triangles: Float) -> tuple[list[Part], tuple[
         return [verge], ("the map has no pavements: new posts may stand on a strip of verge",)
     plan = shapely.polygons(triangles[:, :, :2])
     near = shapely.distance(street.region, plan) <= CANDIDATE_MARGIN
-    kerbs = road_surface.kerb_faces(triangles, None if street.land is None else KERB_STEP)
+    kerbs = road_surface.kerb_faces(triangles, None if street.relief is None else KERB_STEP)
     parts = [
         Part("Pavements", from_faces(triangles[near], "pavement"), (Role.GROUND, Role.CANDIDATE_AREAS)),
         Part("Pavements beyond", from_faces(triangles[~near], "pavement"), (Role.GROUND,)),
@@ -151,7 +146,8 @@ def _verge_strip(street: SiteGround, sides: BaseGeometry) -> Part:
     """Return a strip of verge along sides of the carriageway, except where the road continues and next to bridges."""
     inner, outer = VERGE_STRIP
     strip = without(sides.buffer(outer, cap_style="flat"), street.roadside.filled.buffer(inner))
-    strip = without(strip, united([street.crossing.off_posts.buffer(outer), street.built_up]))
+    off_posts = street.crossing.area.union(street.crossing.decks)
+    strip = without(strip, united([off_posts.buffer(outer), street.built_up]))
     near = strip.intersection(street.region.buffer(CANDIDATE_MARGIN))
     return area_part("Verge strip", near, Role.CANDIDATE_AREAS, street)
 
@@ -180,7 +176,7 @@ def verge_part(street: SiteGround, furniture: Sequence[Part], surfaces: Sequence
     lanes = lanes if others.is_empty else lanes.union(others)
     lanes = without(lanes, street.crossing.decks.buffer(road_surface.MAX_SEAM, join_style="mitre"))
     open_ground = road_surface.without_crumbs(without(ground, lanes))
-    spacing = VERGE_SPACING if street.relief is None else RELIEF_SPACING
+    spacing = VERGE_SPACING if street.relief is None or street.relief.is_level else RELIEF_SPACING
     triangles = street.ground.drape(open_ground, spacing=spacing, above=-VERGE_BELOW)
     return Part("Verge", from_faces(triangles, "verge"), (Role.GROUND,))
 

@@ -17,6 +17,7 @@ from ...arrays import Float
 from ...geometry.plan import closed, opened, united, without
 from ..opendrive.lanes import LaneSurface
 from ..opendrive.road_map import Road
+from .description import SideWay
 from .road_surface import (
     CARRIAGEWAY,
     MAX_SEAM,
@@ -54,19 +55,6 @@ MAX_MAPPED = 12.0  # metres from the carriageway to a mapped sidewalk that is th
 
 
 @dataclass(frozen=True, eq=False)
-class Sidewalk:
-    """A pavement that the map has as a line of its own: its line (n, 2) and width, metres."""
-
-    line: Float
-    width: float
-
-    @property
-    def area(self) -> BaseGeometry:
-        """Area in plan."""
-        return shapely.LineString(self.line).buffer(self.width / 2, cap_style="flat")
-
-
-@dataclass(frozen=True, eq=False)
 class StreetAreas:
     """Areas in plan of the surfaces of a street, none of which overlap.
 
@@ -96,8 +84,8 @@ class StreetAreas:
 def street_areas(
     lanes: Sequence[LaneSurface],
     junctions: Sequence[JunctionArea],
-    roads: Mapping[str, Road],
-    sidewalks: Sequence[Sidewalk] = (),
+    roads: Sequence[Road],
+    ways: Sequence[SideWay] = (),
     built_up: BaseGeometry = NOTHING,
 ) -> StreetAreas:
     """Return the areas of a street on one level.
@@ -108,10 +96,10 @@ def street_areas(
         Lanes of the level.
     junctions : sequence of JunctionArea
         Junctions of the map in the same axes; only those of the lanes count.
-    roads : mapping of str to Road
-        Roads of the map by id.
-    sidewalks : sequence of Sidewalk
-        Pavements that are mapped as lines. Where one runs along a street, none is assumed.
+    roads : sequence of Road
+        Roads of the map.
+    ways : sequence of SideWay
+        Ways next to the road. Where a sidewalk among them runs along a street, no pavement is assumed.
     built_up : shapely geometry, optional
         Area of buildings, where no pavement lies.
     """
@@ -127,13 +115,15 @@ def street_areas(
     side = roadside(lanes, carriageway)
     walked = _walked(lanes, junctions, widened, carriageway)
     # A mapped line within the carriageway says no more than that the pavement is narrow: the assumed one stays there.
-    lines = united(shapely.LineString(one.line) for one in sidewalks)
+    sidewalks = [(shapely.LineString(one.line), one.width) for one in ways if one.line is not None]
+    lines = united(line for line, _ in sidewalks)
     lines = without(lines, carriageway.buffer(GAP))
-    mapped = united(one.area for one in sidewalks if one.area.dwithin(carriageway, MAX_MAPPED))
+    strips_mapped = (line.buffer(width / 2, cap_style="flat") for line, width in sidewalks)
+    mapped = united(area for area in strips_mapped if area.dwithin(carriageway, MAX_MAPPED))
     # What lies between carriageways or on an island of the street is no pavement unless it is mapped as one.
     assumed = without(_filled(walked, carriageway), united([_towards(side, lines), medians(side)]))
     assumed = opened(assumed, MIN_PAVEMENT_WIDTH)
-    assumed = without_crumbs(assumed, least=MIN_ASSUMED) if len(sidewalks) else assumed
+    assumed = without_crumbs(assumed, least=MIN_ASSUMED) if sidewalks else assumed
     pavement = without(united([assumed, _at_kerb(mapped, carriageway)]), carriageway)
     pavement = opened(without(pavement, built_up), SPIKE)
     return StreetAreas(dict(_groups(strips, carriageway, inside)), without_crumbs(pavement), side, inside)
@@ -215,18 +205,16 @@ class _Taper:
     pavement: BaseGeometry
 
 
-def tapers(
-    lanes: Sequence[LaneSurface], junctions: Iterable[JunctionArea], roads: Mapping[str, Road]
-) -> Iterator[_Taper]:
+def tapers(lanes: Sequence[LaneSurface], junctions: Iterable[JunctionArea], roads: Sequence[Road]) -> Iterator[_Taper]:
     """Yield the tapers where a street gets more lanes or wider ones, along its narrower road; see `street_areas`."""
     joints = {one.id for one in junctions if one.is_joint}
-    through = [road for road in roads.values() if road.junction_id in joints and road.predecessor and road.successor]
+    through = [road for road in roads if road.junction_id in joints and road.predecessor and road.successor]
     pairs = [(road.predecessor.id, road.successor.id) for road in through if road.predecessor and road.successor]
     # A slip road that leaves or joins a street is no other part of it.
     starts, stops = (Counter(ends) for ends in zip(*pairs, strict=True)) if pairs else (Counter[str](), Counter[str]())
     own = by_road([lane for lane in lanes if lane.lane_type])
     paved = {road: [lane for lane in group if lane in in_groups(group, CARRIAGEWAY)] for road, group in own.items()}
-    outside = {road.id for road in roads.values() if road.junction_id is None}
+    outside = {road.id for road in roads if road.junction_id is None}
     areas = {road: united(lane.polygon for lane in group) for road, group in paved.items() if road in outside}
     for before, after in pairs:
         if not paved.get(before) or not paved.get(after) or starts[before] > 1 or stops[after] > 1:

@@ -1,4 +1,7 @@
-"""Streets of a map as surfaces: lanes, junctions, objects and signals, from OpenDRIVE or a network of SUMO."""
+"""Streets of a map as surfaces: lanes and junctions, from OpenDRIVE or a network of SUMO.
+
+Its use is shown in `tests/core/world/openstreetmap/test_network_map.py`.
+"""
 
 from collections.abc import Generator, Mapping
 from dataclasses import dataclass, replace
@@ -9,8 +12,7 @@ from shapely.geometry.base import BaseGeometry
 from ...arrays import Float
 from ...progress import Progress
 from ..opendrive.lanes import LaneSurface, lane_surfaces
-from ..opendrive.objects import PlacedObject, PlacedSignal
-from ..opendrive.profile import Profile
+from ..opendrive.profile import linear_profile
 from ..opendrive.road_map import RoadMap
 from .road_surface import with_rows_at
 
@@ -51,27 +53,21 @@ class StreetMap:
     Parameters
     ----------
     road_map : RoadMap
-        Roads with their names and links; those of a network have no lane sections.
+        Roads with their names and links, objects and traffic lights; roads of a network have no lane sections.
     lanes : tuple of LaneSurface
         Lanes of all roads.
-    objects : tuple of PlacedObject
-        Objects, among them the crossings.
-    signals : tuple of PlacedSignal
-        Traffic lights and signs.
     junctions : tuple of JunctionArea
         Areas of the junctions of a network; empty for OpenDRIVE, whose junctions are the lanes in them.
     """
 
     road_map: RoadMap
     lanes: tuple[LaneSurface, ...]
-    objects: tuple[PlacedObject, ...] = ()
-    signals: tuple[PlacedSignal, ...] = ()
     junctions: tuple[JunctionArea, ...] = ()
 
     def raised(self, profiles: Profiles) -> "StreetMap":
         """Return the streets with new heights of the roads, linear between the given stations."""
         roads = (
-            replace(road, elevation=_linear(*profiles[road.id])) if road.id in profiles else road
+            replace(road, elevation=linear_profile(*profiles[road.id])) if road.id in profiles else road
             for road in self.road_map.roads
         )
         lanes = (_raised(lane, *profiles[lane.road_id]) if lane.road_id in profiles else lane for lane in self.lanes)
@@ -96,13 +92,7 @@ def opendrive_streets(road_map: RoadMap) -> Generator[Progress, None, StreetMap]
         if number % ROADS_PER_STEP == 0:
             yield Progress(number, len(road_map.roads), "roads")
         lanes += lane_surfaces(road)
-    return StreetMap(road_map, tuple(lanes), road_map.objects, road_map.signals)
-
-
-def _linear(along: Float, heights: Float) -> Profile:
-    lengths = np.diff(along)
-    slopes = np.divide(np.diff(heights), lengths, out=np.zeros(len(lengths)), where=lengths > 0)
-    return Profile(along[:-1], np.column_stack([heights[:-1], slopes, np.zeros((len(slopes), 2))]))
+    return StreetMap(road_map, tuple(lanes))
 
 
 def _raised(lane: LaneSurface, along: Float, heights: Float) -> LaneSurface:

@@ -27,7 +27,7 @@ _TOUCHING = 1e-3  # metres from a road within which the ground has its height
 
 @dataclass(frozen=True, eq=False)
 class Relief:
-    """Heights of the ground under a flat map.
+    """Heights of the ground under a map, or next to streets that rise above level land.
 
     Parameters
     ----------
@@ -47,29 +47,15 @@ class Relief:
         """Return the height of the ground above that of the map (n,) at places (n, 2), metres."""
         return self.raster.at(xy) - self.level
 
-    def at(self, xy: Float) -> Float:
-        """Return the heights of the land (n,) at places (n, 2), metres."""
-        return self.raster.at(xy)
+    @property
+    def is_level(self) -> bool:
+        """Whether the ground is as high as in the map everywhere."""
+        return bool((self.raster.heights == self.level).all())
 
 
-@dataclass(frozen=True)
-class FlatLand:
-    """Level land around streets that rise above it on ramps and bridges, or lie below it in underpasses.
-
-    Parameters
-    ----------
-    level : float, metres
-        Height of the land, map coordinates.
-    bridges : frozenset of str
-        Ids of the roads on bridges.
-    """
-
-    level: float
-    bridges: frozenset[str] = frozenset()
-
-    def at(self, xy: Float) -> Float:
-        """Return the heights of the land (n,) at places (n, 2), metres."""
-        return np.full(len(xy), self.level)
+def level_land(level: float) -> Relief:
+    """Return level land, at a height in metres, around streets on ramps and bridges and in underpasses."""
+    return Relief(HeightRaster(np.zeros(2), 1.0, np.full((1, 1), level)), level)
 
 
 class Terrain:

@@ -268,6 +268,12 @@ def shape_points(shape: str) -> Float:
     return apart
 
 
+def shape_text(line: Float, precision: int) -> str:
+    """Return the shape of a line (n, 3) with a number of decimal places, without heights if all are zero."""
+    rows = (line if line[:, 2].any() else line[:, :2]).tolist()
+    return " ".join(",".join(f"{value:.{precision}f}" for value in row) for row in rows)
+
+
 def _checked(limits: Limits, quantity: str, values: Float) -> Float:
     if fault := limits.fault(values):
         raise ValueError(f"{quantity} {fault}")

@@ -1,15 +1,12 @@
-"""Latitude and longitude: the projection against what defines it, and what a user gets who types them."""
+"""Latitude and longitude on a map, and files of other formats."""
 
 import gzip
 import math
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.geometry.geo_reference import projection
 from seip_addon.core.progress import finish
 from seip_addon.core.world.opendrive.read import read_map
 from seip_addon.core.world.openstreetmap.site import place_on_map
@@ -25,24 +22,6 @@ def radii(latitude):
     """Return the radii of curvature of WGS 84 along the meridian and across it."""
     root = 1 - (ECCENTRICITY * math.sin(latitude)) ** 2
     return AXIS * (1 - ECCENTRICITY**2) / root**1.5, AXIS / root**0.5
-
-
-@given(st.floats(-80, 80))
-def test_on_its_meridian_the_projection_keeps_lengths(degrees):
-    to_metres = projection("+proj=utm +zone=32")
-    latitude = np.linspace(0.0, math.radians(degrees), 4001)
-    along = np.array([radii(each)[0] for each in latitude])
-    length = float(((along[1:] + along[:-1]) / 2 * np.diff(latitude)).sum())
-    easting, northing = to_metres(latitude[-1], math.radians(9.0))
-    assert easting == pytest.approx(500_000.0, abs=1e-6)
-    assert northing == pytest.approx(0.9996 * length, abs=0.2)
-
-
-def test_a_known_place_is_where_it_is():
-    """The Eiffel tower in UTM zone 31."""
-    for text in ("+proj=utm +zone=31 +datum=WGS84", "EPSG:32631", "EPSG:25831"):
-        place = projection(text)(math.radians(48.85822), math.radians(2.2945))
-        np.testing.assert_allclose(place, [448_251, 5_411_943], atol=30)
 
 
 def street(tmp_path, reference, *, x=0.0, y=0.0, offset=""):

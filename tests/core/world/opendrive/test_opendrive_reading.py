@@ -58,7 +58,7 @@ BROKEN = {
         road(objects='<object id="4" s="0" t="0"><repeat distance="-1"/></object>'),
         "road 1, object 4: distance=-1 of <repeat> is below zero",
     ),
-    "signal": (road(signals='<signal id="4" s="0"/>'), "road 1, signal 4: <signal> has no 't'"),
+    "signal": (road(signals='<signal id="4" s="0" dynamic="yes"/>'), "road 1, signal 4: <signal> has no 't'"),
 }
 
 
@@ -166,7 +166,7 @@ EVERYTHING = document(
         '<repeat s="5" length="40" distance="0" widthStart="1" widthEnd="2" heightStart="1" heightEnd="2"/>'
         '<outline closed="true"><cornerLocal u="1" v="2" z="3"/><cornerRoad s="7" t="8" dz="0.5" height="2"/></outline>'
         "</object>",
-        signals='<signal id="1" s="10" t="-5" zOffset="2" hOffset="0.1" height="1" width="1"/>',
+        signals='<signal id="1" dynamic="yes" s="10" t="-5" zOffset="2" hOffset="0.1" height="1" width="1"/>',
     )
 )
 VALUES = [match.span(1) for match in re.finditer(r'(?<![a-z])[a-zA-Z]+="([^"]*)"', EVERYTHING)]

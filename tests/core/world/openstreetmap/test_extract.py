@@ -62,7 +62,7 @@ INLINE = '<way id="2"><nd ref="1" lat="1" lon="1"/><nd ref="2" lat="1" lon="2"/>
         ("<osmChange/>", "list of changes, not an extract: download the place as OpenStreetMap XML"),
         (
             ' {"elements": []}',
-            r"is JSON; download the place as OpenStreetMap XML \(.osm\), from Overpass with \[out:xml\]",
+            r"is JSON, not an extract: choose OpenStreetMap XML \(.osm\), from Overpass with \[out:xml\]",
         ),
         (osm(INLINE), "has ways without nodes: query Overpass with `out body;"),
         (osm(f'<node id="7" lat="1" lon="1"/>{INLINE}'), "has ways without nodes: query Overpass with `out body;"),

@@ -5,9 +5,10 @@ import pytest
 import shapely
 
 from seip_addon.core.errors import SeipError
+from seip_addon.core.geometry.tangent_plane import plan_metres
 from seip_addon.core.progress import finish
 from seip_addon.core.workflows.network_sites import extract_xml
-from seip_addon.core.world.openstreetmap.crossings import SAME_JUNCTION, metres, selected_junctions
+from seip_addon.core.world.openstreetmap.crossings import SAME_JUNCTION, selected_junctions
 from seip_addon.core.world.openstreetmap.extract import cropped, read_extract, window
 from tests.builders.osm_text import Extract
 
@@ -45,7 +46,7 @@ def test_rules_select_by_signals_and_by_class(town):
 def test_two_carriageways_are_one_junction(town):
     found = selected_junctions(town, ["all"])
     assert names(found).count("Fourth Road / Main Street") == 1
-    plane = metres([(one.latitude, one.longitude) for one in found], (52.5, 13.4))
+    plane = plan_metres([(one.latitude, one.longitude) for one in found], (52.5, 13.4))
     apart = np.hypot(*(plane[:, None] - plane[None]).transpose(2, 0, 1))
     assert apart[~np.eye(len(found), dtype=bool)].min() > SAME_JUNCTION
 

@@ -83,11 +83,10 @@ def test_a_junction_of_two_arms_is_a_joint_whose_lanes_are_those_of_the_street(t
 
 def test_crossings_and_signals_are_placed(tmp_path):
     streets = read(tmp_path).streets
-    (crossing,) = streets.objects
+    (crossing,) = streets.road_map.objects
     assert crossing.position[:2] == pytest.approx([100.0, -2.0])
     assert (crossing.length, crossing.width) == pytest.approx((4.0, 6.0))
-    (signal,) = streets.signals
-    assert signal.dynamic
+    (signal,) = streets.road_map.signals
     assert signal.position[:2] == pytest.approx([98.0, -1.6])
 
 
@@ -108,7 +107,7 @@ def test_raised_streets_and_their_file_agree(tmp_path):
     (lane,) = [one for one in raised.lanes if one.road_id == "2" and one.lane_type == "driving"]
     assert np.interp([40.0, 69.0], lane.s, lane.left[:, 2]) == pytest.approx([2.0, 2.5])
     path = tmp_path / "raised.net.xml"
-    path.write_text(network.raised_text(profiles), encoding="utf-8")
+    path.write_text(network.raised(profiles).text, encoding="utf-8")
     again = {one.road_id: one for one in read_network_map(path).streets.lanes if one.lane_type == "driving"}
     assert np.interp([40.0, 69.0], again["2"].s, again["2"].right[:, 2]) == pytest.approx([2.0, 2.5])
     assert again[":b_1"].left[[0, -1], 2] == pytest.approx([3.0, 4.0])

@@ -11,7 +11,7 @@ from seip_addon.core.workflows.site_places import site_places
 from seip_addon.core.world.openstreetmap.crossings import named_crossings
 from seip_addon.core.world.openstreetmap.extract import read_extract
 from seip_addon.core.world.openstreetmap.map_links import parsed_position
-from seip_addon.core.world.openstreetmap.street_plan import street_plan
+from seip_addon.core.world.street_plan import plan_of_extract
 from tests.builders.osm_text import Extract, crossing
 
 SPHERE = 4e-3
@@ -35,7 +35,7 @@ def town(latitude=52.5, longitude=13.4):
 def read(extract, path):
     found = finish(read_extract(extract.write(path)))
     crossings = named_crossings(found)
-    return crossings, street_plan(found, crossings)
+    return crossings, plan_of_extract(found, crossings)
 
 
 @pytest.fixture

@@ -13,7 +13,6 @@ from seip_addon.core.world.opendrive.read import read_map
 from seip_addon.core.world.streetscape.description import SiteDescription
 from tests.builders.map_models import site_model
 from tests.builders.opendrive_text import document, geometry, lane, read_text, road, section
-from tests.builders.street_map import street_map
 
 MAPS = Path(os.environ.get("SEIP_MAPS") or Path(__file__).resolve().parents[5] / "shared" / "opendrive")
 LANES = section(lane(1), lane(-1))
@@ -75,15 +74,6 @@ def test_it_does_not_climb_onto_a_bridge_over_the_end_of_a_road(tmp_path):
     over = straight(90, 50, -60, 120, np.pi / 2, z=6.0)
     text = town().replace("</OpenDRIVE>", f"{over}</OpenDRIVE>")
     assert region(tmp_path, text, approaches=60.0).bounds == pytest.approx((-70, -3.5, 70, 3.5), abs=0.1)
-
-
-def test_far_coordinates_change_nothing(tmp_path):
-    (tmp_path / "there").mkdir()
-    near, far = (
-        region(folder, street_map(x=x, y=y), approaches=33.0)
-        for folder, x, y in ((tmp_path, 0.0, 0.0), (tmp_path / "there", 5_412_345.0, -4_987_654.0))
-    )
-    assert near.area == pytest.approx(far.area, abs=1e-3)
 
 
 @pytest.mark.slow

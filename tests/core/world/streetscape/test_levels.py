@@ -13,7 +13,7 @@ from seip_addon.core.site.roles import Role
 from seip_addon.core.site.scene_geometry import OTHER_LEVELS
 from seip_addon.core.world.opendrive.read import read_map
 from seip_addon.core.world.streetscape.description import SiteDescription
-from seip_addon.core.world.streetscape.terrain import FlatLand
+from seip_addon.core.world.streetscape.terrain import level_land
 from tests.builders.map_models import site_model
 from tests.builders.opendrive_text import document, geometry, lane, read_text, road, section
 
@@ -155,6 +155,6 @@ def test_roads_that_cross_beyond_the_scene_and_not_in_it_are_built(tmp_path):
     """Parts of both lie in the scene, on land of known height, but their crossing does not."""
     low = street("1", -52, 0, 52), street("4", -88, 0, 100, math.atan2(60, 23))
     text = document(*low, street("5", -58, 12, 90, math.atan2(48, -7), z=DECK))
-    place = SiteDescription(near=(0.0, 0.0), radius=50.0, level=("1", "4"), flat_land=FlatLand(0.0))
+    place = SiteDescription(near=(0.0, 0.0), radius=50.0, level=("1", "4"), relief=level_land(0.0))
     model = finish(site_model(read_text(tmp_path, text), place))
     assert model.region.area > 300

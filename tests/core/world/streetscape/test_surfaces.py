@@ -106,12 +106,3 @@ def test_a_small_gap_between_the_lanes_of_a_junction_is_no_island(size, filled):
     assert without_gaps(roadside(lanes), lanes).contains(gap.centroid) is filled
     median = strip(0, 0, size, size, "median", "5")
     assert not without_gaps(roadside(lanes), (*lanes, median)).contains(gap.centroid)
-
-
-def rectangle(road, low_x, low_y, high_x, high_y):
-    s = np.array([0.0, 1.0])
-    left, right = (np.array([(low_x, y, 0), (high_x, y, 0)], dtype=float) for y in (high_y, low_y))
-    return LaneSurface(
-        road_id=road, junction_id=None, section=0, lane_id=-1, lane_type="driving", keeps_left=False,
-        s=s, left=left, right=right,
-    )  # fmt: skip
