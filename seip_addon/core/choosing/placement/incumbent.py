@@ -44,14 +44,14 @@ class Incumbent:
         goal: float = -math.inf,
     ) -> None:
         self.instance, self.work = instance, work
-        self._describe, self._goal = describe, goal
+        self._describe, self.goal = describe, goal
         self.chosen: Integer = np.zeros(0, dtype=np.int64)
         self.value, self.bound, self.best = -math.inf, math.inf, ""
 
     @property
     def least_better(self) -> float:
         """Least value of a better placement: lower bounds than this are proof enough."""
-        return max(self.value + self.instance.step, self._goal)
+        return max(self.value + self.instance.step, self.goal)
 
     def close(self) -> None:
         """Record that no placement is better."""
@@ -68,7 +68,7 @@ class Incumbent:
         ):
             return False
         self.chosen, self.value = chosen, value
-        if value >= self._goal > -math.inf:
+        if value >= self.goal > -math.inf:
             self.work.end()
         if self._describe is not None:
             self.best = self._describe(self.instance.original[chosen], value * self.instance.unit)

@@ -22,7 +22,6 @@ MAX_SINGLE_TOTAL = 20_000.0  # total of whole weights up to which single precisi
 MAX_DOUBLE = 20_000_000  # entries of A up to which several blocks together are kept in double precision
 WHOLE_SLACK = 0.25  # whole weights differ by one or not at all
 BINARY_PARTS = 16  # whole numbers, halves and so on up to this have a common unit
-DENOMINATORS = range(1, 13)  # a common unit of all weights is sought among these parts of the smallest one
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -246,14 +245,9 @@ def common_unit(weights: Float) -> tuple[float, bool]:
     weights : (n,) float64
         Positive.
     """
-    total = math.fsum(weights)
     parts = weights * BINARY_PARTS
-    if total * BINARY_PARTS <= MAX_EXACT and np.array_equal(np.rint(parts), parts):
+    if math.fsum(weights) * BINARY_PARTS <= MAX_EXACT and np.array_equal(np.rint(parts), parts):
         return float(np.gcd.reduce(parts.astype(np.int64))) / BINARY_PARTS, True
-    for share in DENOMINATORS:
-        unit = float(weights.min()) / share
-        if total / unit <= MAX_EXACT and np.array_equal(np.rint(weights / unit) * unit, weights):
-            return unit, True
     return 1.0, False
 
 

@@ -126,8 +126,8 @@ def search_and_prove(
     if few and (yield from branches.run_greedily(GREEDY_SHARE)):
         return name
     rest, part = branches.left(), work.part(PROGRAM_SHARE * work.left)
-    tight = isinstance(instance.blocks[0].g, Steps) and incumbent.gap <= TIGHT_GAP
-    if instance.is_plain and (tight or solver != "auto") and is_affordable(instance.of(rest), part):
+    linear = instance.is_plain and isinstance(instance.blocks[0].g, Steps)
+    if linear and (incumbent.gap <= TIGHT_GAP or solver != "auto") and is_affordable(instance.of(rest), part):
         name = f"{name}, {check_solver(solver)}"
         yield from prove_by_program(incumbent, rest, solver, part)
     if not incumbent.proven:
