@@ -22,7 +22,8 @@ from .search import without_idle
 from .search_limits import DEFAULT_LIMITS, SolverLimits
 from .solver import Describe, search_and_prove
 
-BOUND_STEPS, PRICE_STEPS = 100, 10  # steps of the bound on the value of any placement, and then of that on its price
+BOUND_STEPS, PRICE_STEPS = 300, 3  # steps of the bound on the value of any placement, and then of that on its price
+REPORTED = 10  # steps between two reports
 FINISHING_SHARE, LEAST_FINISHING = 0.25, 0.5
 """Share of the work, and least units of it, for the choice among equally cheap placements."""
 UNPROVEN_PRICE = (
@@ -81,7 +82,6 @@ class _Cheapest:
         if first.value < self._goal:
             raise SeipError(self._unreached(first))
         chosen, proven = without_idle(first, self._goal), False
-        least = yield from self._least_price(chosen)
         while not proven and work.left > 0 and (cheaper := self._cheaper(chosen)) is not None:
             served = yield from serving_choice(cheaper, self._solver)
             if served is None:
@@ -92,7 +92,9 @@ class _Cheapest:
                 proven = found.proven
                 break
             chosen = without_idle(found, self._goal)
-        return (yield from self._finished(chosen, least, proven=proven or self._cheaper(chosen) is None))
+        proven = proven or self._cheaper(chosen) is None
+        least = math.fsum(self._instance.price[chosen]) if proven else (yield from self._least_price(chosen))
+        return (yield from self._finished(chosen, least))
 
     def _searched(
         self, instance: Instance, most: float, start: Integer, known: Integer | None = None
@@ -138,12 +140,12 @@ class _Cheapest:
         rest = replace(rest_of(instance, none, every), budget=math.fsum(instance.price[chosen]))
         base: Float = np.zeros(len(block.weight))
         bound = bound_at(block, rest, base, block.start(base), block.rounding)
-        for _, lower in zip(
-            range(BOUND_STEPS), falling_bounds(block, rest, base, bound, goal, block.rounding), strict=False
-        ):
+        falling = falling_bounds(block, rest, base, bound, goal, block.rounding)
+        for number, lower in zip(range(BOUND_STEPS), falling, strict=False):
             bound = lower
             self._work.spend(block.operations)
-            yield Progress(0, 0, "computing a lower bound on the price")
+            if number % REPORTED == 0:
+                yield Progress(0, 0, "computing a lower bound on the price")
         least = float(instance.price.min())
         for _ in range(PRICE_STEPS):
             if bound.selection.multiplier == 0:
@@ -156,7 +158,7 @@ class _Cheapest:
             least = math.ceil(least / single * (1 - TIE_TOLERANCE)) * single
         return least
 
-    def _finished(self, chosen: Integer, least: float, *, proven: bool) -> Generator[Progress, None, Placement]:
+    def _finished(self, chosen: Integer, least: float) -> Generator[Progress, None, Placement]:
         """Return the placement of largest coverage among those as cheap as a given one."""
         problem, instance, work = self._problem, self._instance, self._work
         price = math.fsum(instance.price[chosen])
@@ -167,7 +169,7 @@ class _Cheapest:
         solver = yield from search_and_prove(incumbent, start, self._solver, instance.original[chosen])
         kept = incumbent.chosen
         cost = math.fsum(instance.price[kept])
-        optimal = proven or least >= cost * (1 - 3 * TIE_TOLERANCE)
+        optimal = least >= cost * (1 - 3 * TIE_TOLERANCE)
         notes = [] if optimal else [UNPROVEN_PRICE]
         if not incumbent.proven:
             more = (incumbent.bound - incumbent.value) * instance.unit / math.fsum(problem.weights)

@@ -29,7 +29,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, ClassVar, Protocol, Self
+from typing import Any, Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -174,13 +174,6 @@ class ConcaveSum:
         """Return what each candidate adds to amounts ``base`` (t,), (c,) float64."""
         raise NotImplementedError
 
-    has_product: ClassVar[bool] = False
-    """Whether one product of matrices gives `gains_after`."""
-
-    def gains_after(self, base: Float, first: Integer) -> Float:
-        """Return `gains` after each of some candidates is added, (k, c)."""
-        return np.stack([self.gains(base + self.amounts[one]) for one in first])
-
     def open_targets(self, base: Float) -> Integer:
         """Return the targets to which further sensors may add anything."""
         return np.arange(len(base))
@@ -233,7 +226,6 @@ class StepSum(ConcaveSum):
 
     g: Steps
     _last: _LastGains = field(default_factory=_LastGains, repr=False)
-    has_product = True
 
     @property
     def operations(self) -> float:

@@ -14,8 +14,8 @@ from ...arrays import Float, Integer
 from ...counts import counted
 from ...errors import SeipError
 from ...progress import Progress, finish, within
-from .branch_and_bound import BranchAndBound
-from .concave import Steps
+from .branch_and_bound import BranchAndBound, GainSearch
+from .concave import Steps, StepSum
 from .feasibility import starting_choice
 from .incumbent import Incumbent
 from .instance import Instance, make_instance
@@ -25,11 +25,11 @@ from .risk import NOMINAL, Risk
 from .search import Search, without_idle
 from .search_limits import DEFAULT_LIMITS, SolverLimits, Work
 
-QUICK_SHARE, GREEDY_SHARE = 0.04, 0.95
-"""Shares of what is left for branch and bound by gains only, before and after the restarts."""
-GREEDY_SENSORS = 5  # sensors up to which that often ends with a proof
-RESTART_SHARE = 0.6  # share of what is left for restarts
-SCENARIO_SHARE = 0.3  # the same over scenarios, whose placements begin from the nominal optimum
+RESTART_SHARE, SHORT_SHARE = 0.6, 0.3
+"""Shares of what is left for restarts; the second one over scenarios, whose placements begin from the nominal optimum,
+and for few sensors, of which all placements can be searched."""
+FEW_SENSORS, GAIN_SHARE = 5, 0.95
+"""Sensors up to which a search by gains often ends with a proof, and its share of what is left."""
 ROUNDS = 8  # rounds of fictitious play for the shares of scenarios
 PROGRAM_SHARE = 0.5  # share of what is left then for an integer program
 TIGHT_GAP = 0.01  # largest gap at which an integer program is tried without being asked for
@@ -115,15 +115,19 @@ def search_and_prove(
     yield from search.first()
     if known is not None:
         yield from search.adapt(np.flatnonzero(np.isin(instance.original, known)))
-    branches, name = BranchAndBound(incumbent, instance.relaxed(_shares(incumbent))), "branch and bound"
+    block = instance.relaxed(_shares(incumbent))
+    branches, name = BranchAndBound(incumbent, block), "branch and bound"
     promise = yield from branches.start()
     if incumbent.proven:
         return name
-    few = instance.count <= GREEDY_SENSORS
-    if few and (yield from branches.run_greedily(QUICK_SHARE)):
-        return name
-    yield from search.restarts((RESTART_SHARE if instance.is_plain else SCENARIO_SHARE) * work.left, promise)
-    if few and (yield from branches.run_greedily(GREEDY_SHARE)):
+    few = instance.count <= FEW_SENSORS and math.isinf(instance.budget)
+    share = RESTART_SHARE if instance.is_plain and not few else SHORT_SHARE
+    yield from search.restarts(share * work.left, promise)
+    if (
+        few
+        and isinstance(block, StepSum)
+        and (yield from GainSearch(incumbent, block).run(branches.left(), GAIN_SHARE))
+    ):
         return name
     rest, part = branches.left(), work.part(PROGRAM_SHARE * work.left)
     linear = instance.is_plain and isinstance(instance.blocks[0].g, Steps)
