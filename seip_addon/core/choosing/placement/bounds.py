@@ -233,16 +233,10 @@ def _within(one: tuple[int, ...], other: tuple[int, ...]) -> bool:
     return one != other and all(own <= more for own, more in zip(one, other, strict=True))
 
 
-def first_bound(block: ConcaveSum, rest: Rest, base: Float, rounding: float) -> Bound:
-    """Return the bound by the gains of all candidates on top of the chosen ones (Leskovec et al. 2007, section 3.2)."""
-    selection = rest.select(block.gains(base))
-    return Bound(block.value_at(base) + selection.value + rounding, block.lowest(base), selection)
-
-
 def bound_at(
     block: ConcaveSum, rest: Rest, base: Float, parameters: Float, rounding: float, near: float = 0.0
 ) -> Bound:
-    """Return the bound for given parameters (t,)."""
+    """Return the bound for given parameters (t,); at the lowest ones it is that by gains (Leskovec et al. 2007)."""
     constant, score = block.bound(base, parameters)
     selection = rest.select(score, near)
     return Bound(constant + selection.value + rounding, parameters, selection)

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from ...arrays import Boolean, Float, Integer
 from ...progress import Progress
-from .bounds import Bound, Composition, Rest, bound_at, compositions, falling_bounds, first_bound, rest_of
+from .bounds import Bound, Composition, Rest, bound_at, compositions, falling_bounds, rest_of
 from .concave import ConcaveSum, StepSum
 from .incumbent import Incumbent
 
@@ -187,7 +187,8 @@ class BranchAndBound:
         if root.composition is not None and self.incumbent.work.left > self._spare:
             bound = bound_at(problem.block, problem.rest, problem.base, begin[targets], problem.raised)
         if root.composition is None:
-            by_gains = first_bound(problem.block, problem.rest, problem.base, problem.raised)
+            lowest = problem.block.lowest(problem.base)
+            by_gains = bound_at(problem.block, problem.rest, problem.base, lowest, problem.raised)
             bound = min(bound, by_gains, key=lambda one: one.value)
         self.incumbent.work.spend(2.0 * problem.block.operations)
         for _ in range(0, ROOT_STEPS, ROUND):
@@ -304,7 +305,8 @@ class BranchAndBound:
             incumbent.offer(node.chosen)
             return
         problem, targets = self._problem(node, left)
-        by_gains = first_bound(problem.block, problem.rest, problem.base, problem.raised)
+        lowest = problem.block.lowest(problem.base)
+        by_gains = bound_at(problem.block, problem.rest, problem.base, lowest, problem.raised)
         incumbent.work.spend(2.0 * problem.block.operations)
         if problem.rest.count == 1:
             complete(incumbent, node.chosen, left, by_gains.constant + by_gains.selection.net)

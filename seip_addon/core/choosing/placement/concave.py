@@ -29,7 +29,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, Protocol, Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,22 +42,9 @@ DOUBLE_ROUNDING = 1e-11  # the same for double precision
 MAX_UPDATES, UPDATED_SHARE = 100, 0.3  # updates of earlier results in a row, and share of targets that may change
 
 
-class Concave(Protocol):
-    """A concave, increasing function with g(0) = 0."""
-
-    def __call__(self, x: Float) -> Float:
-        """Return g(x), of the shape of x."""
-
-    def sum_over(self, amounts: NDArray[Any], weight: Float, *, single: bool) -> ConcaveSum:
-        """Return the sum for amounts (c, t) and weights (t,), in single precision if that is enough."""
-
-    def gap(self, value: float, bound: float, weight: float) -> float:
-        """Return the gap of a value of F to a bound, for a total weight."""
-
-
 @dataclass(frozen=True)
 class Steps:
-    """A concave function of the number of sensors that see a target, linear between whole numbers.
+    """A concave function g of the number of sensors that see a target, linear between whole numbers; g(0) = 0.
 
     Parameters
     ----------
@@ -74,11 +61,11 @@ class Steps:
         return value
 
     def sum_over(self, amounts: NDArray[Any], weight: Float, *, single: bool) -> ConcaveSum:
-        """Return the sum; ``amounts`` is (c, t) bool."""
+        """Return F for amounts (c, t) bool and weights (t,), in single precision if that is enough."""
         return StepSum(amounts.astype(np.float32 if single else np.float64, order="C"), weight, self)
 
-    def gap(self, value: float, bound: float, weight: float) -> float:  # noqa: ARG002 -- of the protocol
-        """Return the distance of the bound from the value as a share of the value."""
+    def gap(self, value: float, bound: float, weight: float) -> float:  # noqa: ARG002 -- as of the other function
+        """Return the gap of a value of F to a bound: their distance as a share of the value."""
         return relative_gap(value, bound)
 
 
@@ -91,8 +78,8 @@ class Logarithm:
         value: Float = np.log1p(x)
         return value
 
-    def sum_over(self, amounts: NDArray[Any], weight: Float, *, single: bool) -> ConcaveSum:  # noqa: ARG002 -- of the protocol
-        """Return the sum; ``amounts`` is (c, t) float."""
+    def sum_over(self, amounts: NDArray[Any], weight: Float, *, single: bool) -> ConcaveSum:  # noqa: ARG002 -- as of the other function
+        """Return F for amounts (c, t) float and weights (t,)."""
         return LogSum(np.ascontiguousarray(amounts, dtype=np.float32), weight, self)
 
     def gap(self, value: float, bound: float, weight: float) -> float:
@@ -100,6 +87,7 @@ class Logarithm:
         return math.expm1(max(0.0, bound - value) / weight)
 
 
+Concave = Steps | Logarithm
 COVERAGE, LOG_RETURNS = Steps(), Logarithm()
 
 

@@ -35,14 +35,8 @@ def serving_choice(instance: Instance, solver: str) -> Generator[Progress, None,
     if len(instance.mandatory) == 0:
         return np.zeros(0, np.int64)
     members = np.flatnonzero(instance.mandatory.any(axis=0))
-    part = instance.of(members)
-    program = PlacementProgram(part)
-    program.model += program.number <= len(part.mandatory)
-    # of all choices one with a large value of each sensor, as a start for the search
-    separately = part.gains(np.zeros(0, dtype=np.int64))
-    scaled = program.number_among(np.arange(len(part)), 1e4 / max(float(separately.max()), 1e-12) * separately)
-    outcome = yield from program.maximise(scaled, solver, Work(math.inf))
-    return None if outcome.chosen is None else members[outcome.chosen]
+    fewest = yield from _least(instance.of(members), solver)
+    return None if fewest is None else members[fewest]
 
 
 def _why_infeasible(problem: PlacementProblem, part: Instance, solver: str) -> Generator[Progress, None, str]:

@@ -57,22 +57,21 @@ class Incumbent:
         """Record that no placement is better."""
         self.bound = max(self.value, self.least_better - self.instance.step)
 
-    def offer(self, chosen: Integer) -> bool:
+    def offer(self, chosen: Integer) -> None:
         """Take a placement if it is feasible and of a larger value, or as good with fewer or cheaper sensors."""
         chosen = np.sort(np.asarray(chosen, dtype=np.int64))
         if not self.instance.feasible(chosen):
-            return False
+            return
         value = self.instance.value(chosen)
         if value <= self.value + self.instance.slack and not (
             value >= self.value and self._effort(chosen) < self._effort(self.chosen)
         ):
-            return False
+            return
         self.chosen, self.value = chosen, value
         if value >= self.goal > -math.inf:
             self.work.end()
         if self._describe is not None:
             self.best = self._describe(self.instance.original[chosen], value * self.instance.unit)
-        return True
 
     @property
     def proven(self) -> bool:

@@ -127,9 +127,9 @@ class PlacementProgram:
         for clique in _cover_by_cliques(instance.conflict):
             self.model += self.number_among(clique) <= 1
 
-    def number_among(self, candidates: Integer, factors: Float | None = None) -> Expression:
-        """Return the (weighted) number of sensors among some candidates."""
-        return _linear([self.x[i] for i in candidates], np.ones(len(candidates)) if factors is None else factors)
+    def number_among(self, candidates: Integer) -> Expression:
+        """Return the number of sensors among some candidates."""
+        return _linear([self.x[i] for i in candidates], np.ones(len(candidates)))
 
     def maximise(
         self, objective: Expression, solver: str, work: Work, entries: int = 0

@@ -30,7 +30,6 @@ RESTART_SHARE, SHORT_SHARE = 0.6, 0.3
 and for few sensors, of which all placements can be searched."""
 FEW_SENSORS, GAIN_SHARE = 5, 0.95
 """Sensors up to which a search by gains often ends with a proof, and its share of what is left."""
-ROUNDS = 8  # rounds of fictitious play for the shares of scenarios
 PROGRAM_SHARE = 0.5  # share of what is left then for an integer program
 TIGHT_GAP = 0.01  # largest gap at which an integer program is tried without being asked for
 MORE = 2  # sensors beyond those of a placement, up to which `front_of` goes
@@ -140,26 +139,15 @@ def search_and_prove(
 
 
 def _shares(incumbent: Incumbent) -> Float:
-    """Return the shares of the blocks for a small bound on the risk measure, (K,) float64, by fictitious play.
+    """Return shares of the blocks for a bound on the risk measure, (K,) float64: the worst ones of the best placement.
 
-    Any shares of at most 1/m that add up to 1 give a bound. An opponent adds the worst blocks of each placement, and
-    greedy choices answer the shares so far (Brown 1951).
+    Any shares of at most 1/m that add up to 1 give a bound.
     """
-    instance, risk = incumbent.instance, incumbent.instance.risk
-    blocks = len(instance.blocks)
-    if risk.counted(blocks) == blocks:
-        return np.full(blocks, 1.0 / blocks)
-    shares, chosen = np.zeros(blocks), incumbent.chosen
-    for _ in range(ROUNDS):
-        outcomes = np.array([block.value(chosen) for block in instance.blocks])
-        shares[risk.worst(outcomes)] += 1.0
-        chosen = np.zeros(0, dtype=np.int64)
-        while (addable := instance.addable(chosen)).any() and incumbent.work.left > 0:
-            gains = np.stack([block.gains(block.together(chosen)) for block in instance.blocks])
-            incumbent.work.spend(instance.operations)
-            chosen = np.append(chosen, int(np.argmax(np.where(addable, shares @ gains, -1.0))))
-    normalised: Float = shares / shares.sum()
-    return normalised
+    outcomes = np.array([block.value(incumbent.chosen) for block in incumbent.instance.blocks])
+    worst = incumbent.instance.risk.worst(outcomes)
+    shares = np.zeros(len(outcomes))
+    shares[worst] = 1.0 / len(worst)
+    return shares
 
 
 def placement_of(problem: PlacementProblem, incumbent: Incumbent, solver: str) -> Placement:

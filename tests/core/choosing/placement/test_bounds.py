@@ -8,7 +8,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from seip_addon.core.choosing.placement.bounds import bound_at, compositions, falling_bounds, first_bound, rest_of
+from seip_addon.core.choosing.placement.bounds import bound_at, compositions, falling_bounds, rest_of
 from seip_addon.core.choosing.placement.instance import make_instance
 from seip_addon.core.errors import SeipError
 from tests.builders.placement_problems import all_choices, random_problem, row_problem
@@ -44,7 +44,8 @@ def test_no_choice_exceeds_any_of_the_falling_bounds_nor_those_of_its_candidates
         begin = bound_at(block, rest, base, block.start(base), block.rounding)
         steps = falling_bounds(block, rest, base, begin, 0.0, block.rounding)
         values = []
-        for bound in (first_bound(block, rest, base, block.rounding), begin, *itertools.islice(steps, 40)):
+        lowest = bound_at(block, rest, base, block.lowest(base), block.rounding)
+        for bound in (lowest, begin, *itertools.islice(steps, 40)):
             forced = bound.forced()
             for one in within:
                 assert value[tuple(one)] <= bound.value
