@@ -280,7 +280,7 @@ class BranchAndBound:
         """Return the problem of a node, and its targets."""
         whole = self._block.together(node.chosen)
         targets = self._block.open_targets(whole)
-        block, base = self._block.one_of_many(left, targets), whole[targets]
+        block, base = self._block.of(left, targets), whole[targets]
         raised = self._rounding + self._block.value_at(whole) - block.value_at(base)
         first = np.intersect1d(node.first, left)
         rest = rest_of(self.instance, node.chosen, left, node.composition)
@@ -509,7 +509,7 @@ class GainSearch:
         self._met += 1
         count, whole = self.instance.count - len(chosen), block.together(chosen)
         targets = block.open_targets(whole)
-        part, base, value = block.one_of_many(left, targets), whole[targets], block.value_at(whole) + self._rounding
+        part, base, value = block.of(left, targets), whole[targets], block.value_at(whole) + self._rounding
         gains = part.gains(base)
         order = np.argsort(-gains, kind="stable")
         left, gains = left[order], gains[order]

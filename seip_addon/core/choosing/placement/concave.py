@@ -125,10 +125,6 @@ class ConcaveSum:
             return type(self)(self.amounts[keep], self.weight, self.g)
         return type(self)(self.amounts[keep].take(targets, axis=1), self.weight[targets], self.g)
 
-    def one_of_many(self, keep: Integer, targets: Integer) -> Self:
-        """Return the same as `of`; faster where it is called many times on one sum."""
-        return self.of(keep, targets)
-
     def together(self, chosen: Integer) -> Float:
         """Return the amounts of chosen candidates together at each target, (t,) float64."""
         together: Float = self.amounts[chosen].sum(axis=0, dtype=np.float64)
@@ -234,8 +230,10 @@ class StepSum(ConcaveSum):
     def _bytes(self) -> NDArray[np.uint8]:
         return self.amounts.astype(np.uint8)
 
-    def one_of_many(self, keep: Integer, targets: Integer) -> Self:
-        """Return the same as `of`: gathering bytes takes less than half the time of gathering floats."""
+    def of(self, keep: Integer, targets: Integer | None = None) -> Self:
+        """Return the sum for some of the candidates and targets; gathering bytes takes half the time of floats."""
+        if targets is None:
+            return super().of(keep)
         amounts = self._bytes[keep].take(targets, axis=1).astype(self.amounts.dtype)
         return type(self)(amounts, self.weight[targets], self.g)
 

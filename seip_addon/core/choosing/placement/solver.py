@@ -51,10 +51,10 @@ def solve(
 ) -> Generator[Progress, None, Placement]:
     """Choose the placement of largest value.
 
-    A greedy choice improved by swaps is there at once. Then a linear bound and branch and bound on it, which prove many
-    problems; restarts of the search for as long as they find better placements; and branch and bound again, up to the
-    limit of work. Of equally good placements the first one found is kept, unless a later one has fewer sensors or a
-    lower price. The result does not depend on the order of candidates and targets.
+    A greedy choice improved by swaps is there at once. Then follow a linear bound; restarts of the search for as long
+    as they find better placements; for few sensors a search by gains, which proves many problems; and branch and bound
+    on the linear bound, up to the limit of work. Of equally good placements the first one found is kept, unless a later
+    one has fewer sensors or a lower price. The result does not depend on the order of candidates and targets.
 
     Values are equal if they differ by less than rounding: whole weights are compared exactly, other values to a
     billionth of the total weight.
