@@ -36,6 +36,7 @@ LEAST_GAP = 0.002  # gap below which the next stage is the last one
 MAX_PAIRS = 4_000_000  # pairs of a child and a candidate that are bounded at once
 PAIR_OPERATIONS = 60.0  # multiplications that take as long as what is done for each such pair
 PRODUCT_SHARE = 0.1  # time of a multiplication in a product of matrices, as a share of one in other steps
+SELECT_OPERATIONS = 2.0  # multiplications that take as long as to select an amount for a node
 REPORTED = 10  # nodes between two reports
 
 
@@ -307,7 +308,7 @@ class BranchAndBound:
         problem, targets = self._problem(node, left)
         lowest = problem.block.lowest(problem.base)
         by_gains = bound_at(problem.block, problem.rest, problem.base, lowest, problem.raised)
-        incumbent.work.spend(2.0 * problem.block.operations)
+        incumbent.work.spend(2.0 * problem.block.operations + SELECT_OPERATIONS * problem.block.amounts.size)
         if problem.rest.count == 1:
             complete(incumbent, node.chosen, left, by_gains.constant + by_gains.selection.net)
             return

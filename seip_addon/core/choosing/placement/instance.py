@@ -83,13 +83,8 @@ class Instance:
         )
 
     @property
-    def operations(self) -> float:
-        """Number of multiplications that take as long as the gains of all candidates."""
-        return sum(block.operations for block in self.blocks)
-
-    @property
     def update_operations(self) -> float:
-        """The same for gains that follow others of similar placements."""
+        """Number of multiplications that take as long as all gains, after those of a similar choice."""
         return sum(block.update_operations for block in self.blocks)
 
     @property
