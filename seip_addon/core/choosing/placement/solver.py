@@ -120,13 +120,10 @@ def search_and_prove(
     if incumbent.proven:
         return name
     few = instance.count <= FEW_SENSORS and math.isinf(instance.budget)
-    share = RESTART_SHARE if instance.is_plain and not few else SHORT_SHARE
+    by_gains = GainSearch(incumbent, block) if few and isinstance(block, StepSum) else None
+    share = RESTART_SHARE if instance.is_plain and by_gains is None else SHORT_SHARE
     yield from search.restarts(share * work.left, promise)
-    if (
-        few
-        and isinstance(block, StepSum)
-        and (yield from GainSearch(incumbent, block).run(branches.left(), GAIN_SHARE))
-    ):
+    if by_gains is not None and (yield from by_gains.run(branches.left(), GAIN_SHARE)):
         return name
     rest, part = branches.left(), work.part(PROGRAM_SHARE * work.left)
     linear = instance.is_plain and isinstance(instance.blocks[0].g, Steps)
