@@ -29,7 +29,6 @@ PATIENCE, STEP_REDUCTION = 10, 0.6  # steps without a smaller bound, and the fac
 MIN_STEP = 1e-3  # length of a step at which the descent ends
 FACTORS = (0.8, 0.95, 1.0, 1.05, 1.25)  # factors by which the budget's multiplier may change in a step
 MAX_PRICES, MAX_COMPOSITIONS = 3, 30  # different prices, and numbers of each, that are bounded separately at most
-PRICES_TRIED = 200  # multipliers of the price that are tried for a bound on it
 
 
 @dataclass(frozen=True, eq=False)
@@ -234,16 +233,10 @@ def _within(one: tuple[int, ...], other: tuple[int, ...]) -> bool:
     return one != other and all(own <= more for own, more in zip(one, other, strict=True))
 
 
-def first_bound(block: ConcaveSum, rest: Rest, base: Float, rounding: float) -> Bound:
-    """Return the bound by the gains of all candidates on top of the chosen ones (Leskovec et al. 2007, section 3.2)."""
-    selection = rest.select(block.gains(base))
-    return Bound(block.value_at(base) + selection.value + rounding, block.lowest(base), selection)
-
-
 def bound_at(
     block: ConcaveSum, rest: Rest, base: Float, parameters: Float, rounding: float, near: float = 0.0
 ) -> Bound:
-    """Return the bound for given parameters (t,)."""
+    """Return the bound for given parameters (t,); at the lowest ones it is that by gains (Leskovec et al. 2007)."""
     constant, score = block.bound(base, parameters)
     selection = rest.select(score, near)
     return Bound(constant + selection.value + rounding, parameters, selection)
@@ -288,24 +281,3 @@ def falling_bounds(
             step, stale, direction = step * STEP_REDUCTION, 0, 0.0
             current = best = replace(best, step=step)
         yield best
-
-
-def least_price(rest: Rest, bound: Bound, goal: float) -> float:
-    r"""Return a price below which no placement reaches an objective value.
-
-    With a multiplier :math:`μ > 0` of the price a placement of price P has at most the value :math:`L(μ) + μ P`, so
-    that :math:`P \ge (goal - L(μ)) / μ`.
-    """
-    selection = bound.selection
-    score = selection.net + selection.multiplier * rest.price
-    constant = bound.value - selection.value
-    worth = np.unique(score[rest.price > 0] / rest.price[rest.price > 0])
-    worth = worth[worth > 0]
-    # the selection changes only where the multiplier passes a ratio of score to price: of many an even spread is tried
-    tried = worth[np.linspace(0, len(worth) - 1, min(len(worth), PRICES_TRIED)).astype(np.int64)]
-    free = replace(rest, budget=math.inf)
-    prices = [0.0]
-    for multiplier in tried.tolist():
-        selected = free._select(score - multiplier * rest.price, 0.0)  # noqa: SLF001 -- of the same module
-        prices.append((goal - constant - selected.value) / multiplier)
-    return float(max(prices))

@@ -1,4 +1,4 @@
-"""Best-first branch and bound on linear bounds, which shares its best placement with the search.
+"""Branch and bound, which shares its best placement with the search: best-first on linear bounds, or by gains.
 
 A node is the set of placements with some chosen candidates and any of those that are left. Its candidates are sorted by
 what they contribute to its bound; each child chooses one of them and leaves out those before it. The bounds of children
@@ -12,7 +12,7 @@ later stage. So the bound of all falls early, at little work for each node, and 
 from __future__ import annotations
 
 import math
-from collections.abc import Generator, Iterator
+from collections.abc import Generator
 from dataclasses import dataclass, field, replace
 from heapq import heapify, heappop, heappush
 
@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 
 from ...arrays import Boolean, Float, Integer
 from ...progress import Progress
-from .bounds import Bound, Composition, Rest, bound_at, compositions, falling_bounds, first_bound, rest_of
-from .concave import ConcaveSum
+from .bounds import Bound, Composition, Rest, bound_at, compositions, falling_bounds, rest_of
+from .concave import ConcaveSum, StepSum
 from .incumbent import Incumbent
 
 ROOT_STEPS, NODE_STEPS = 300, 8  # largest number of steps of the bound at the root, and at each other node
@@ -33,13 +33,10 @@ FEW_SENSORS, DEEP_SHARE, GOAL_SHARE = 5, 0.36, 0.7
 """Share of the gap that remains at the end of each stage, up to a number of sensors and beyond it: with few sensors a
 stage ends soon, and a low goal spares the work of those between."""
 LEAST_GAP = 0.002  # gap below which the next stage is the last one
-TRIALS, LEAST_SUCCESS = 20, 0.2
-"""Nodes of each depth whose bounds are lowered in any case, and share of them that must be cut for it to go on."""
-LISTED = 3  # sensors to come of which products of matrices give all values
-FEW = 60  # candidates up to which the gains after each child are a better use of time than steps of the bound
-MAX_PAIRS = 4_000_000  # entries of the gains after each child that are computed at once
-PAIR_OPERATIONS = 60.0  # multiplications that take as long as what is done for each pair of a child and a candidate
+MAX_PAIRS = 4_000_000  # pairs of a child and a candidate that are bounded at once
+PAIR_OPERATIONS = 60.0  # multiplications that take as long as what is done for each such pair
 PRODUCT_SHARE = 0.1  # time of a multiplication in a product of matrices, as a share of one in other steps
+SELECT_OPERATIONS = 2.0  # multiplications that take as long as to select an amount for a node
 REPORTED = 10  # nodes between two reports
 
 
@@ -127,11 +124,10 @@ class BranchAndBound:
         self.incumbent, self.instance, self._block = incumbent, incumbent.instance, block
         self._rounding, self._total = block.rounding, block.value(np.arange(len(block)))
         self._number = self._met = 0
-        self._tried: dict[int, tuple[int, float]] = {}
         self._open: list[_Node] = []
         self._waiting: list[_Node] = []
         self._goal = -math.inf
-        self._by_gains_only, self._spare = False, 0.0
+        self._spare = 0.0
 
     @property
     def bound(self) -> float:
@@ -192,7 +188,8 @@ class BranchAndBound:
         if root.composition is not None and self.incumbent.work.left > self._spare:
             bound = bound_at(problem.block, problem.rest, problem.base, begin[targets], problem.raised)
         if root.composition is None:
-            by_gains = first_bound(problem.block, problem.rest, problem.base, problem.raised)
+            lowest = problem.block.lowest(problem.base)
+            by_gains = bound_at(problem.block, problem.rest, problem.base, lowest, problem.raised)
             bound = min(bound, by_gains, key=lambda one: one.value)
         self.incumbent.work.spend(2.0 * problem.block.operations)
         for _ in range(0, ROOT_STEPS, ROUND):
@@ -220,35 +217,18 @@ class BranchAndBound:
     def run(self) -> Generator[Progress, None, bool]:
         """Search until nothing can be better, or the work is done; return whether the best placement is proven."""
         while not self._next_stage():
-            if not (yield from self._finish_stage(0.0)):
+            if not (yield from self._finish_stage()):
                 return False
         return True
 
-    def run_greedily(self, share: float) -> Generator[Progress, None, bool]:
-        """Search with a share of the work that is left, without stages and by gains only.
-
-        Where gains come by products of matrices, few sensors are proven soonest in this way: in the order of gains each
-        sensor adds no more than the one before it (cf. Nemhauser and Wolsey 1981).
-        """
-        if not self._block.has_product or len(self._open) != 1 or self.incumbent.proven:
-            return self.incumbent.proven
-        first, self._by_gains_only = list(self._open), True
-        spare = (1.0 - share) * self.incumbent.work.left
-        finished = yield from self._finish_stage(spare)
-        self._by_gains_only = False
-        self._open = [] if finished else first
-        if finished:
-            self.incumbent.close()
-        return finished
-
-    def _finish_stage(self, spare: float) -> Generator[Progress, None, bool]:
-        """Take nodes until none reaches the goal of the stage; return False if no more than ``spare`` work is left."""
+    def _finish_stage(self) -> Generator[Progress, None, bool]:
+        """Take nodes until none reaches the goal of the stage; return False if no work is left before."""
         incumbent = self.incumbent
         while self._open and -self._open[0].rank >= max(self._goal, incumbent.least_better):
             if self._met % REPORTED == 0:
                 self._note(self.bound)
                 yield incumbent.progress("proving that no placement is better")
-            if incumbent.work.left <= spare:
+            if incumbent.work.left <= 0:
                 self._note(self.bound)
                 return False
             self._met += 1
@@ -301,7 +281,7 @@ class BranchAndBound:
         """Return the problem of a node, and its targets."""
         whole = self._block.together(node.chosen)
         targets = self._block.open_targets(whole)
-        block, base = self._block.one_of_many(left, targets), whole[targets]
+        block, base = self._block.of(left, targets), whole[targets]
         raised = self._rounding + self._block.value_at(whole) - block.value_at(base)
         first = np.intersect1d(node.first, left)
         rest = rest_of(self.instance, node.chosen, left, node.composition)
@@ -326,22 +306,21 @@ class BranchAndBound:
             incumbent.offer(node.chosen)
             return
         problem, targets = self._problem(node, left)
-        by_gains = first_bound(problem.block, problem.rest, problem.base, problem.raised)
-        incumbent.work.spend(2.0 * problem.block.operations)
+        lowest = problem.block.lowest(problem.base)
+        by_gains = bound_at(problem.block, problem.rest, problem.base, lowest, problem.raised)
+        incumbent.work.spend(2.0 * problem.block.operations + SELECT_OPERATIONS * problem.block.amounts.size)
         if problem.rest.count == 1:
-            self._complete(node.chosen, left, by_gains.constant + by_gains.selection.net)
+            complete(incumbent, node.chosen, left, by_gains.constant + by_gains.selection.net)
             return
-        bound = by_gains if self._by_gains_only else self._lowered(node, problem, by_gains, targets)
+        bound = self._lowered(node, problem, by_gains, targets)
         incumbent.offer(np.append(node.chosen, left[bound.selection.picked]))
         limit = min(bound.value, -node.rank)
         parameters = node.parameters.copy()
         parameters[targets] = bound.parameters
         node = replace(node, left=left, parameters=parameters)
         reach = np.minimum(np.minimum(bound.forced(), by_gains.forced()), limit)
-        goal = incumbent.least_better
-        if not self._is_small(problem):  # a small problem is not worth a division
-            self._push_unlikely(node, reach)
-            goal = max(self._goal, goal)
+        self._push_unlikely(node, reach)
+        goal = max(self._goal, incumbent.least_better)
         within = np.flatnonzero(reach >= goal)
         if len(within):
             problem = self._restricted(replace(problem, node=node), within)
@@ -349,28 +328,17 @@ class BranchAndBound:
             first = np.isin(problem.left, problem.first)
             if len(problem.rest.groups):
                 first = min(problem.rest.groups, key=np.count_nonzero)
-            bounds = (by_gains,) if self._by_gains_only else (bound, by_gains)
-            orders = [_Order(problem.rest, one, within, first, limit) for one in bounds]
+            orders = [_Order(problem.rest, one, within, first, limit) for one in (bound, by_gains)]
             self._branch(problem, min(orders, key=lambda order: order.children(goal)), goal)
 
-    def _is_small(self, problem: _Problem) -> bool:
-        """Return whether products of matrices soon list all choices of a problem."""
-        return problem.block.has_product and len(problem.left) <= FEW and problem.rest.count <= LISTED
-
     def _lowered(self, node: _Node, problem: _Problem, bound: Bound, targets: Integer) -> Bound:
-        """Lower the bound of a node by several steps, unless that has rarely helped at its depth."""
-        goal, depth = max(self._goal, self.incumbent.least_better), len(node.chosen)
-        limit = min(bound.value, -node.rank)
-        tried, closed = self._tried.get(depth, (0, 0.0))
-        if limit < goal or self._is_small(problem) or (tried >= TRIALS and closed < LEAST_SUCCESS * tried):
+        """Lower the bound of a node by several steps, from that of its parent or by gains."""
+        if min(bound.value, -node.rank) < max(self._goal, self.incumbent.least_better):
             return bound
         block, base = problem.block, problem.base
         from_parent = bound_at(block, problem.rest, base, block.clipped(base, node.parameters[targets]), problem.raised)
         self.incumbent.work.spend(block.operations)
-        bound = self._steps(problem, min(bound, from_parent, key=lambda one: one.value), NODE_STEPS)
-        share = (limit - max(bound.value, goal)) / (limit - goal) if limit > goal else 1.0
-        self._tried[depth] = tried + 1, closed + max(0.0, share)
-        return bound
+        return self._steps(problem, min(bound, from_parent, key=lambda one: one.value), NODE_STEPS)
 
     def _steps(self, problem: _Problem, bound: Bound, most: int) -> Bound:
         """Return the bound after a number of steps, or less if it falls below the goal."""
@@ -403,80 +371,21 @@ class BranchAndBound:
         rows : (k,) int64
             Their candidates, as indices into the order.
         """
-        rest, block, ordered = problem.rest, problem.block, problem.left[order.candidates]
+        ordered = problem.left[order.candidates]
         # a child has no candidate whose own child comes before it
         later = np.arange(len(ordered)) > rows[:, None]
         later &= ~self.instance.conflict[np.ix_(ordered[rows], ordered)]
         most, reach = order.reach(rows)
-        if block.has_product:
-            gains = block.gains_after(problem.base, order.candidates[rows])[:, order.candidates]
-            self.incumbent.work.spend(PRODUCT_SHARE * len(rows) * block.operations)
-            values = block.value_at(problem.base) + block.gains(problem.base)[order.candidates[rows]] + problem.raised
-            for bound in self._by_gains(rest, order, rows, values, np.where(later, gains, 0.0)):
-                most, reach = np.minimum(most, bound[0]), np.minimum(reach, bound[1])
         reach = np.minimum(reach, most[:, None])
         self.incumbent.work.spend(PAIR_OPERATIONS * reach.size)
         for row in np.flatnonzero(most >= self.incumbent.least_better).tolist():
             chosen = np.append(problem.node.chosen, ordered[rows[row]])
             among = later[row] & (reach[row] >= self.incumbent.least_better)
-            able = np.flatnonzero(among)
-            if not len(able):
-                self.incumbent.offer(chosen)
-            elif block.has_product and rest.count == LISTED - 1:
-                self._complete(chosen, ordered[able], reach[row, able])
-            elif block.has_product and rest.count == LISTED:
-                bounds = values[row] + gains[row, able]
-                self._list_pairs(problem, chosen, order.candidates[rows[row]], order.candidates[able], bounds)
-            else:
+            if among.any():
                 child = replace(problem.node, chosen=chosen, left=ordered, first=ordered, able=np.packbits(among))
-                self._push(child, min(float(most[row]), float(reach[row, able].max())))
-
-    def _list_pairs(self, problem: _Problem, chosen: Integer, own: int, left: Integer, values: Float) -> None:
-        """Offer the placements of a child with up to two sensors more that may be better.
-
-        Parameters
-        ----------
-        chosen : (k,) int64
-            Candidates of the child.
-        own : int
-            Candidate of the child, as an index among those of the problem.
-        left : (n,) int64
-            Candidates that may follow, as such indices.
-        values : (n,) float64
-            Upper bounds on the child with each of them.
-        """
-        incumbent, block = self.incumbent, problem.block
-        incumbent.offer(chosen)
-        base = problem.base + block.amounts[own]
-        targets = block.open_targets(base)
-        part, base = block.of(left, targets), base[targets]
-        pairs = values[:, None] + np.maximum(part.gains_after(base, np.arange(len(left))), 0.0)
-        incumbent.work.spend(PRODUCT_SHARE * len(left) * part.operations)
-        members = problem.left[left]
-        pairs[self.instance.conflict[np.ix_(members, members)] | np.tri(len(left), dtype=bool)] = -math.inf
-        prices = math.fsum(self.instance.price[chosen]) + self.instance.price[members]
-        pairs[~self.instance.affordable(prices[:, None] + self.instance.price[members])] = -math.inf
-        for one in np.flatnonzero(values >= incumbent.least_better):
-            incumbent.offer(np.append(chosen, members[one]))
-        better = np.argwhere(pairs >= incumbent.least_better)
-        for first, second in better[np.argsort(-pairs[tuple(better.T)], kind="stable")].tolist():
-            if pairs[first, second] < incumbent.least_better:
-                return
-            incumbent.offer(np.append(chosen, members[[first, second]]))
-
-    def _by_gains(
-        self, rest: Rest, order: _Order, rows: Integer, values: Float, gains: Float
-    ) -> Iterator[tuple[Float, Float]]:
-        """Yield bounds on children (k,), and on those with each further candidate (k, n), by the gains after each.
-
-        What several sensors add together is at most the sum of what each adds by itself. Under a budget the same holds
-        of gains less a multiplier times the price.
-        """
-        yield _with_largest(rest, order, rows, values, gains)
-        if order.multiplier > 0:
-            net = np.maximum(gains - order.multiplier * rest.price[order.candidates], 0.0)
-            spare = order.multiplier * (rest.budget - rest.price[order.candidates[rows]])
-            yield _with_largest(rest, order, rows, values + spare, net)
+                self._push(child, min(float(most[row]), float(reach[row, among].max())))
+            else:
+                self.incumbent.offer(chosen)
 
     def _addable(self, node: _Node) -> Integer:
         """Return the candidates left that are within the budget and the composition, without conflicts."""
@@ -489,14 +398,6 @@ class BranchAndBound:
             kind, quota = node.composition.kind, np.array(node.composition.quota)
             room &= (np.bincount(kind[chosen], minlength=len(quota)) < quota)[kind[left]]
         return left[room]
-
-    def _complete(self, chosen: Integer, left: Integer, most: Float) -> None:
-        """Offer the placements with one sensor more that may be better, by upper bounds on their values."""
-        self.incumbent.offer(chosen)
-        for one in np.argsort(-most, kind="stable").tolist():
-            if most[one] < self.incumbent.least_better:
-                return
-            self.incumbent.offer(np.append(chosen, left[one]))
 
 
 class _Order:
@@ -520,26 +421,21 @@ class _Order:
         Indices among those left.
     among : int
         Number of those that have children.
-    kind : (n,) int64
-        Kind of each.
     most : (among,) float64
         Bound on the placements with each candidate and any after it, which never rises along the order.
-    multiplier : float
-        Multiplier of the budget.
     """
 
     def __init__(self, rest: Rest, bound: Bound, within: Integer, first: Boolean, limit: float) -> None:
         net = bound.selection.net[within]
         self.candidates: Integer = np.lexsort((-net, ~first))
         self.among = among = int(np.count_nonzero(first))
-        self._net, self.multiplier = net[self.candidates], bound.selection.multiplier
-        self.kind = rest.kind[self.candidates]
+        self._net, self._kind = net[self.candidates], rest.kind[self.candidates]
         added = np.maximum(self._net, 0.0)
         largest = self._net[:among].copy()
         self._weakest = np.zeros((among, len(rest.quota)))
         for kind, quota in enumerate(rest.quota):
             # the largest sum of those after each candidate: some of the others, and the next of those with children
-            own = self.kind == kind
+            own = self._kind == kind
             others = _sums(added[among:][own[among:]])
             sums, begin = _sums(added[:among][own[:among]]), np.cumsum(own[:among])
             most = np.minimum(quota - own[:among], rest.count - 1)
@@ -561,7 +457,7 @@ class _Order:
 
     def reach(self, rows: Integer) -> tuple[Float, Float]:
         """Return the bounds on some children (k,), and on those with each further candidate (k, n)."""
-        weakest = self._weakest[rows][:, self.kind]
+        weakest = self._weakest[rows][:, self._kind]
         # a candidate replaces the weakest one of the sum itself: of the other bound it would take away too much
         return self.most[rows], self._largest[rows][:, None] - weakest + np.minimum(self._net, weakest)
 
@@ -571,19 +467,94 @@ def _sums(values: Float) -> Float:
     return np.concatenate([[0.0], np.cumsum(values)])
 
 
-def _with_largest(rest: Rest, order: _Order, rows: Integer, value: Float, gains: Float) -> tuple[Float, Float]:
-    """Return values of children (k,) with the largest gains (k, n) of each kind, and with each gain (k, n) too."""
-    most, weakest = value.copy(), np.zeros(gains.shape)
-    for kind, quota in enumerate(rest.quota):
-        own = np.flatnonzero(order.kind == kind)
-        left = np.minimum(quota - (order.kind[rows] == kind), rest.count - 1)
-        for number in np.unique(left).tolist():
-            same = np.flatnonzero(left == number)
-            part = gains[np.ix_(same, own)]
-            if number < 1 or not len(own):
-                continue
-            if number < len(own):
-                part = np.partition(part, len(own) - number, axis=1)[:, len(own) - number :]
-                weakest[np.ix_(same, own)] = part.min(axis=1)[:, None]
-            most[same] += part.sum(axis=1)
-    return most, most[:, None] - weakest + np.minimum(gains, weakest)
+class GainSearch:
+    """Depth-first search of all placements of some candidates, in the order of gains.
+
+    What several sensors add together is at most the sum of what each adds by itself (cf. Nemhauser and Wolsey 1981).
+    One product of matrices has the gains of all candidates after each of them: so few sensors are proven soonest.
+
+    Parameters
+    ----------
+    incumbent : Incumbent
+        Best placement so far, with the limit of work; it is improved where a better one is met.
+    block : StepSum
+        Sum over all candidates of the instance that is nowhere below the objective; see `Instance.relaxed`.
+    """
+
+    def __init__(self, incumbent: Incumbent, block: StepSum) -> None:
+        self.incumbent, self.instance, self._block = incumbent, incumbent.instance, block
+        self._rounding, self._met, self._spare = block.rounding, 0, 0.0
+
+    def run(self, among: Integer, share: float) -> Generator[Progress, None, bool]:
+        """Search with a share of the work that is left; return whether the best placement is proven.
+
+        Parameters
+        ----------
+        among : (n,) int64
+            Candidates that a better placement may contain.
+        """
+        self._spare = (1.0 - share) * self.incumbent.work.left
+        yield from self._visit(among[:0], among)
+        if self.incumbent.work.left <= self._spare:
+            return False
+        self.incumbent.close()
+        return True
+
+    def _visit(self, chosen: Integer, left: Integer) -> Generator[Progress, None, None]:
+        """Search the placements of some candidates and of those that are left, none of which they exclude."""
+        incumbent, block = self.incumbent, self._block
+        if incumbent.work.left <= self._spare:
+            return
+        if self._met % REPORTED == 0:
+            yield incumbent.progress("proving that no placement is better")
+        self._met += 1
+        count, whole = self.instance.count - len(chosen), block.together(chosen)
+        targets = block.open_targets(whole)
+        part, base, value = block.of(left, targets), whole[targets], block.value_at(whole) + self._rounding
+        gains = part.gains(base)
+        order = np.argsort(-gains, kind="stable")
+        left, gains = left[order], gains[order]
+        incumbent.work.spend(part.operations)
+        if count == 1:
+            complete(incumbent, chosen, left, value + gains)
+            return
+        # each child has only candidates of smaller gain
+        sums, number = _sums(gains), len(left)
+        most = value + sums[np.minimum(np.arange(number) + count, number)] - sums[:number]
+        children, further = int(np.count_nonzero(most >= incumbent.least_better)), min(count - 1, number)
+        at_once = max(1, MAX_PAIRS // number)
+        for begin in range(0, children, at_once):
+            rows = np.arange(begin, min(children, begin + at_once))
+            able = self._able(chosen, left, rows)
+            after = np.where(able, part.gains_after(base, order[rows])[:, order], 0.0)
+            incumbent.work.spend(len(rows) * (PRODUCT_SHARE * part.operations + PAIR_OPERATIONS * number))
+            largest = np.partition(after, number - further, axis=1)[:, number - further :]
+            bound, weakest = value + gains[rows] + largest.sum(axis=1), largest.min(axis=1)[:, None]
+            reach = bound[:, None] - weakest + np.minimum(after, weakest)
+            able &= reach >= incumbent.least_better
+            for row in np.flatnonzero(bound >= incumbent.least_better).tolist():
+                child, members = np.append(chosen, left[rows[row]]), left[able[row]]
+                if not len(members):
+                    incumbent.offer(child)
+                elif count == 2:
+                    complete(incumbent, child, members, reach[row, able[row]])
+                else:
+                    yield from self._visit(child, np.sort(members))
+
+    def _able(self, chosen: Integer, left: Integer, rows: Integer) -> Boolean:
+        """Return which candidates may follow each of some children, (k, n)."""
+        instance = self.instance
+        later: Boolean = np.arange(len(left)) > rows[:, None]
+        later &= ~instance.conflict[np.ix_(left[rows], left)]
+        if math.isfinite(instance.budget):
+            spent = math.fsum(instance.price[chosen]) + instance.price[left[rows]]
+            later &= instance.affordable(spent[:, None] + instance.price[left])
+        return later
+
+
+def complete(incumbent: Incumbent, chosen: Integer, left: Integer, most: Float) -> None:
+    """Offer the placements with one sensor more that may be better, by upper bounds on their values."""
+    for one in np.argsort(-most, kind="stable").tolist():
+        if most[one] < incumbent.least_better:
+            return
+        incumbent.offer(np.append(chosen, left[one]))

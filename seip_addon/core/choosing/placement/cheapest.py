@@ -11,18 +11,19 @@ import numpy as np
 from ...arrays import Float, Integer
 from ...errors import SeipError
 from ...progress import Progress
-from .bounds import bound_at, falling_bounds, least_price, rest_of
+from .bounds import bound_at, falling_bounds, rest_of
 from .feasibility import serving_choice, starting_choice
 from .incumbent import Incumbent
 from .instance import Instance, make_instance
 from .integer_program import check_solver
 from .objective import SAME_PRICE
 from .problem import TIE_TOLERANCE, Placement, PlacementProblem, assess
-from .search import Search, without_idle
+from .search import without_idle
 from .search_limits import DEFAULT_LIMITS, SolverLimits
 from .solver import Describe, search_and_prove
 
-BOUND_STEPS = 100  # steps of the bound on the price of any placement
+BOUND_STEPS, PRICE_STEPS = 300, 3  # steps of the bound on the value of any placement, and then of that on its price
+REPORTED = 10  # steps between two reports
 FINISHING_SHARE, LEAST_FINISHING = 0.25, 0.5
 """Share of the work, and least units of it, for the choice among equally cheap placements."""
 UNPROVEN_PRICE = (
@@ -65,7 +66,7 @@ class _Cheapest:
     def __init__(
         self, problem: PlacementProblem, share: float, limits: SolverLimits, describe: Describe | None
     ) -> None:
-        self._problem, self._limits, self._describe = problem, limits, describe
+        self._problem, self._solver, self._describe = problem, limits.solver, describe
         self._work = limits.work()
         self._instance = make_instance(problem)
         self._whole = math.fsum(problem.weights) / self._instance.unit
@@ -75,42 +76,44 @@ class _Cheapest:
 
     def solve(self) -> Generator[Progress, None, Placement]:
         """Find a placement, cheaper ones for as long as there are any, and the one of largest coverage among these."""
-        instance, work = self._instance, self._work
-        chosen = yield from self._reaching()
-        least = yield from self._least_price(chosen)
-        proven = False
+        work = self._work
+        start = yield from starting_choice(self._problem, self._instance, self._solver)
+        first = yield from self._searched(self._instance, work.left, start)
+        if first.value < self._goal:
+            raise SeipError(self._unreached(first))
+        chosen, proven = without_idle(first, self._goal), False
         while not proven and work.left > 0 and (cheaper := self._cheaper(chosen)) is not None:
-            incumbent = Incumbent(cheaper, work.part((1.0 - FINISHING_SHARE) * work.left), self._describe, self._goal)
-            start = yield from serving_choice(cheaper, self._limits.solver)
-            if start is None:
+            served = yield from serving_choice(cheaper, self._solver)
+            if served is None:
                 proven = True
                 break
-            yield from search_and_prove(incumbent, start, self._limits.solver, instance.original[chosen])
-            proven = incumbent.proven
-            if incumbent.value < self._goal:
+            found = yield from self._searched(cheaper, (1.0 - FINISHING_SHARE) * work.left, served, chosen)
+            if found.value < self._goal:
+                proven = found.proven
                 break
-            chosen, proven = without_idle(incumbent, self._goal), False
-        return (yield from self._finished(chosen, least, proven=proven or self._cheaper(chosen) is None))
+            chosen = without_idle(found, self._goal)
+        proven = proven or self._cheaper(chosen) is None
+        least = math.fsum(self._instance.price[chosen]) if proven else (yield from self._least_price(chosen))
+        return (yield from self._finished(chosen, least))
 
-    def _reaching(self) -> Generator[Progress, None, Integer]:
-        """Return some placement that reaches the goal: a greedy one by gain per price, or the result of a search."""
-        goal, solver = self._goal, self._limits.solver
-        incumbent = Incumbent(self._instance, self._work.part(self._work.left), self._describe, goal)
-        start = yield from starting_choice(self._problem, self._instance, solver)
-        search = Search(incumbent, start)
-        for power in (1.0, 0.0):
-            incumbent.offer((yield from search.filled(start, power, "choosing greedily", goal)))
-        if incumbent.value < goal:
-            yield from search_and_prove(incumbent, start, solver)
-        if incumbent.value >= goal:
-            return without_idle(incumbent, goal)
-        wanted = f"a coverage of {goal / self._whole:.2%}"
+    def _searched(
+        self, instance: Instance, most: float, start: Integer, known: Integer | None = None
+    ) -> Generator[Progress, None, Incumbent]:
+        """Search an instance until the goal is reached or proven out of reach, for units of work."""
+        incumbent = Incumbent(instance, self._work.part(most), self._describe, self._goal)
+        known = None if known is None else instance.original[known]
+        yield from search_and_prove(incumbent, start, self._solver, known)
+        return incumbent
+
+    def _unreached(self, incumbent: Incumbent) -> str:
+        """Return the message that the goal is out of reach, or was not found."""
+        wanted = f"a coverage of {self._goal / self._whole:.2%}"
         if incumbent.proven:
-            raise SeipError(
+            return (
                 f"{wanted} cannot be reached: no placement covers more than "
-                f"{min(goal, incumbent.bound) / self._whole:.2%}; ask for less, or allow more or better sensors"
+                f"{min(self._goal, incumbent.bound) / self._whole:.2%}; ask for less, or allow more or better sensors"
             )
-        raise SeipError(
+        return (
             f"no placement with {wanted} was found: the best one covers {max(0.0, incumbent.value) / self._whole:.2%}; "
             "ask for less or raise the effort"
         )
@@ -127,35 +130,46 @@ class _Cheapest:
         return replace(instance, budget=min(below, instance.budget))
 
     def _least_price(self, chosen: Integer) -> Generator[Progress, None, float]:
-        """Return a price below which no placement reaches the goal."""
+        r"""Return a price below which no placement reaches the goal.
+
+        With a multiplier :math:`μ > 0` of the price a placement of price P has at most the value :math:`L + μ P`, so
+        that :math:`P \ge (goal - L) / μ`. The multiplier is the one for the price so far, in turn (Newton's method).
+        """
         instance, goal = self._instance, self._goal
         block, every, none = instance.blocks[0], np.arange(len(instance)), np.zeros(0, dtype=np.int64)
         rest = replace(rest_of(instance, none, every), budget=math.fsum(instance.price[chosen]))
         base: Float = np.zeros(len(block.weight))
         bound = bound_at(block, rest, base, block.start(base), block.rounding)
-        steps = falling_bounds(block, rest, base, bound, goal, block.rounding)
-        for _, lower in zip(range(BOUND_STEPS), steps, strict=False):
+        falling = falling_bounds(block, rest, base, bound, goal, block.rounding)
+        for number, lower in zip(range(BOUND_STEPS), falling, strict=False):
             bound = lower
             self._work.spend(block.operations)
-            yield Progress(0, 0, "computing a lower bound on the price")
-        least = max(least_price(rest, bound, goal), float(instance.price.min()))
+            if number % REPORTED == 0:
+                yield Progress(0, 0, "computing a lower bound on the price")
+        least = float(instance.price.min())
+        for _ in range(PRICE_STEPS):
+            if bound.selection.multiplier == 0:
+                break
+            least = max(least, rest.budget - (bound.value - goal) / bound.selection.multiplier)
+            rest = replace(rest, budget=least)
+            bound = bound_at(block, rest, base, bound.parameters, block.rounding)
         if self._equal_prices and least > 0:
             single = float(instance.price[0])
             least = math.ceil(least / single * (1 - TIE_TOLERANCE)) * single
         return least
 
-    def _finished(self, chosen: Integer, least: float, *, proven: bool) -> Generator[Progress, None, Placement]:
+    def _finished(self, chosen: Integer, least: float) -> Generator[Progress, None, Placement]:
         """Return the placement of largest coverage among those as cheap as a given one."""
         problem, instance, work = self._problem, self._instance, self._work
         price = math.fsum(instance.price[chosen])
         same = replace(instance, count=len(chosen)) if self._equal_prices else replace(instance, budget=price)
         incumbent = Incumbent(same, work.part(max(work.left, LEAST_FINISHING)), self._describe)
         incumbent.offer(chosen)
-        start = yield from starting_choice(problem, same, self._limits.solver)
-        solver = yield from search_and_prove(incumbent, start, self._limits.solver, instance.original[chosen])
+        start = yield from starting_choice(problem, same, self._solver)
+        solver = yield from search_and_prove(incumbent, start, self._solver, instance.original[chosen])
         kept = incumbent.chosen
         cost = math.fsum(instance.price[kept])
-        optimal = proven or least >= cost * (1 - 3 * TIE_TOLERANCE)
+        optimal = least >= cost * (1 - 3 * TIE_TOLERANCE)
         notes = [] if optimal else [UNPROVEN_PRICE]
         if not incumbent.proven:
             more = (incumbent.bound - incumbent.value) * instance.unit / math.fsum(problem.weights)

@@ -27,43 +27,24 @@ the continuous relaxation, which spreads amounts thinly over many sensors; the s
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, ClassVar, Protocol, Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...arrays import Float, Integer
 
-MAX_EXPONENT = 85.0  # logarithm of the largest product in single precision, with room to spare
-MANY_ROWS = 100  # candidates from which amounts are arranged for products: in a search, not at a node
 ROWS_AT_ONCE = 16  # rows that stay in a processor's cache
 SINGLE_ROUNDING = 1e-5  # share of a sum of single-precision products by which it may be wrong
 DOUBLE_ROUNDING = 1e-11  # the same for double precision
 MAX_UPDATES, UPDATED_SHARE = 100, 0.3  # updates of earlier results in a row, and share of targets that may change
 
 
-class Concave(Protocol):
-    """A concave, increasing function with g(0) = 0."""
-
-    def __call__(self, x: Float) -> Float:
-        """Return g(x), of the shape of x."""
-
-    def sum_over(self, amounts: NDArray[Any], weight: Float, *, single: bool) -> ConcaveSum:
-        """Return the sum for amounts (c, t) and weights (t,), in single precision if that is enough."""
-
-    def lines(self, most: float) -> tuple[Float, Float]:
-        """Return intercepts and slopes (k,) of lines whose minimum is g, or little more, from 0 to ``most``."""
-
-    def gap(self, value: float, bound: float, weight: float) -> float:
-        """Return the gap of a value of F to a bound, for a total weight."""
-
-
 @dataclass(frozen=True)
 class Steps:
-    """A concave function of the number of sensors that see a target, linear between whole numbers.
+    """A concave function g of the number of sensors that see a target, linear between whole numbers; g(0) = 0.
 
     Parameters
     ----------
@@ -80,17 +61,11 @@ class Steps:
         return value
 
     def sum_over(self, amounts: NDArray[Any], weight: Float, *, single: bool) -> ConcaveSum:
-        """Return the sum; ``amounts`` is (c, t) bool."""
+        """Return F for amounts (c, t) bool and weights (t,), in single precision if that is enough."""
         return StepSum(amounts.astype(np.float32 if single else np.float64, order="C"), weight, self)
 
-    def lines(self, most: float) -> tuple[Float, Float]:  # noqa: ARG002 -- of the protocol: other functions need it
-        """Return the lines through each step, and the horizontal one at the end."""
-        slope = np.append(self.rises, 0.0)
-        level = np.arange(len(slope))
-        return np.concatenate([[0.0], np.cumsum(self.rises)]) - slope * level, slope
-
-    def gap(self, value: float, bound: float, weight: float) -> float:  # noqa: ARG002 -- of the protocol
-        """Return the distance of the bound from the value as a share of the value."""
+    def gap(self, value: float, bound: float, weight: float) -> float:  # noqa: ARG002 -- as of the other function
+        """Return the gap of a value of F to a bound: their distance as a share of the value."""
         return relative_gap(value, bound)
 
 
@@ -98,32 +73,21 @@ class Steps:
 class Logarithm:
     """The value g(x) = ln(1 + x) of returns: each further return is worth less than the one before."""
 
-    error: ClassVar[float] = 0.01  # largest excess of `lines` over g
-
     def __call__(self, x: Float) -> Float:
         """Return ln(1 + x)."""
         value: Float = np.log1p(x)
         return value
 
-    def sum_over(self, amounts: NDArray[Any], weight: Float, *, single: bool) -> ConcaveSum:  # noqa: ARG002 -- of the protocol
-        """Return the sum; ``amounts`` is (c, t) float."""
+    def sum_over(self, amounts: NDArray[Any], weight: Float, *, single: bool) -> ConcaveSum:  # noqa: ARG002 -- as of the other function
+        """Return F for amounts (c, t) float and weights (t,)."""
         return LogSum(np.ascontiguousarray(amounts, dtype=np.float32), weight, self)
-
-    def lines(self, most: float) -> tuple[Float, Float]:
-        r"""Return tangents at even steps of h in ln(1 + x).
-
-        With u the ratio of 1 + x to 1 + t, the tangent at t exceeds g by :math:`u - 1 - \ln u`. Neighbouring ones
-        intersect where :math:`u = h/(1 - e^{-h}) \approx 1 + h/2`, so that they exceed g by less than :math:`h^2/8`.
-        """
-        step = math.sqrt(8.0 * self.error)
-        at = np.expm1(step * np.arange(math.ceil(math.log1p(most) / step) + 1))
-        return np.log1p(at) - at / (1.0 + at), 1.0 / (1.0 + at)
 
     def gap(self, value: float, bound: float, weight: float) -> float:
         """Return the share by which the geometric mean of 1 + x may be larger."""
         return math.expm1(max(0.0, bound - value) / weight)
 
 
+Concave = Steps | Logarithm
 COVERAGE, LOG_RETURNS = Steps(), Logarithm()
 
 
@@ -161,10 +125,6 @@ class ConcaveSum:
             return type(self)(self.amounts[keep], self.weight, self.g)
         return type(self)(self.amounts[keep].take(targets, axis=1), self.weight[targets], self.g)
 
-    def one_of_many(self, keep: Integer, targets: Integer) -> Self:
-        """Return the same as `of`; faster where it is called many times on one sum."""
-        return self.of(keep, targets)
-
     def together(self, chosen: Integer) -> Float:
         """Return the amounts of chosen candidates together at each target, (t,) float64."""
         together: Float = self.amounts[chosen].sum(axis=0, dtype=np.float64)
@@ -197,13 +157,6 @@ class ConcaveSum:
     def gains(self, base: Float) -> Float:
         """Return what each candidate adds to amounts ``base`` (t,), (c,) float64."""
         raise NotImplementedError
-
-    has_product: ClassVar[bool] = False
-    """Whether one product of matrices gives `gains_after`."""
-
-    def gains_after(self, base: Float, first: Integer) -> Float:
-        """Return `gains` after each of some candidates is added, (k, c)."""
-        return np.stack([self.gains(base + self.amounts[one]) for one in first])
 
     def open_targets(self, base: Float) -> Integer:
         """Return the targets to which further sensors may add anything."""
@@ -257,7 +210,6 @@ class StepSum(ConcaveSum):
 
     g: Steps
     _last: _LastGains = field(default_factory=_LastGains, repr=False)
-    has_product = True
 
     @property
     def operations(self) -> float:
@@ -278,8 +230,10 @@ class StepSum(ConcaveSum):
     def _bytes(self) -> NDArray[np.uint8]:
         return self.amounts.astype(np.uint8)
 
-    def one_of_many(self, keep: Integer, targets: Integer) -> Self:
-        """Return the same as `of`: gathering bytes takes less than half the time of gathering floats."""
+    def of(self, keep: Integer, targets: Integer | None = None) -> Self:
+        """Return the sum for some of the candidates and targets; gathering bytes takes half the time of floats."""
+        if targets is None:
+            return super().of(keep)
         amounts = self._bytes[keep].take(targets, axis=1).astype(self.amounts.dtype)
         return type(self)(amounts, self.weight[targets], self.g)
 
@@ -367,50 +321,6 @@ class StepSum(ConcaveSum):
         return np.clip(parameters, self.lowest(base), 0.0)
 
 
-class _Factors:
-    """Amounts with targets of the same weight next to each other, whose logarithms are one of a product.
-
-    Parameters
-    ----------
-    amounts : (c, t) float32
-    weight : (t,) float64
-
-    Attributes
-    ----------
-    number : int
-        Factors of each product: as many as never exceed the range of single precision.
-    """
-
-    def __init__(self, amounts: NDArray[np.floating[Any]], weight: Float) -> None:
-        largest = math.log(1.0 + float(amounts.max(initial=0.0)))
-        self.number = next((number for number in (8, 4, 2) if number * largest < MAX_EXPONENT), 1)
-        order = np.argsort(weight, kind="stable")
-        places, weights = [], []
-        for group in np.split(order, np.flatnonzero(np.diff(weight[order])) + 1):
-            products = -(-len(group) // self.number)
-            padded = np.full(products * self.number, len(weight))  # an amount of zero is a factor of one
-            padded[: len(group)] = group
-            places.append(padded.reshape(self.number, products))
-            weights.append(np.full(products, weight[group[0]]))
-        self._places = np.concatenate(places, axis=1)
-        self._weight = np.concatenate(weights).astype(np.float32)
-        columns = np.concatenate([amounts, np.zeros((len(amounts), 1), np.float32)], axis=1)
-        self._amounts = np.ascontiguousarray(columns.take(self._places, axis=1))
-
-    def gains(self, base: Float) -> Float:
-        """Return `LogSum.gains`."""
-        scale = np.append(1.0 / (1.0 + base), 0.0).astype(np.float32)[self._places]
-        gains = np.empty(len(self._amounts))
-        for first in range(0, len(gains), ROWS_AT_ONCE):
-            product = self._amounts[first : first + ROWS_AT_ONCE] * scale
-            product += np.float32(1.0)
-            while product.shape[1] > 1:
-                half = product.shape[1] // 2
-                product = product[:, :half] * product[:, half:]
-            gains[first : first + ROWS_AT_ONCE] = np.log(product[:, 0]) @ self._weight
-        return gains
-
-
 @dataclass(frozen=True, eq=False)
 class LogSum(ConcaveSum):
     """F of `Logarithm`: its bound's parameters are ln(1 + x) at the points of the tangents, or -ln σ."""
@@ -422,22 +332,11 @@ class LogSum(ConcaveSum):
 
     @property
     def update_operations(self) -> float:
-        """Products of several amounts, and a logarithm of each."""
+        """Logarithms, without the comparison with tangents."""
         return 2.0 * self.amounts.size
-
-    @cached_property
-    def _factors(self) -> _Factors:
-        return _Factors(self.amounts, self.weight)
-
-    def _blocks(self) -> Iterator[tuple[slice, NDArray[np.floating[Any]]]]:
-        for first in range(0, len(self), ROWS_AT_ONCE):
-            part = slice(first, first + ROWS_AT_ONCE)
-            yield part, self.amounts[part]
 
     def gains(self, base: Float) -> Float:
         """Return the weighted logarithms of the ratios by which each candidate raises 1 + x."""
-        if len(self) >= MANY_ROWS:
-            return self._factors.gains(base)
         return self._scores((1.0 / (1.0 + base)).astype(np.float32), None)
 
     def lowest(self, base: Float) -> Float:
@@ -462,7 +361,9 @@ class LogSum(ConcaveSum):
     def _scores(self, curved: NDArray[np.float32], linear: NDArray[np.float32] | None) -> Float:
         """Return the weighted sums of min(A·linear, ln(1 + A·curved)), (c,)."""
         weight, scores = self.weight.astype(np.float32), np.empty(len(self))
-        for part, rows in self._blocks():
+        for first in range(0, len(self), ROWS_AT_ONCE):
+            part = slice(first, first + ROWS_AT_ONCE)
+            rows = self.amounts[part]
             least = rows * curved
             least += np.float32(1.0)
             np.log(least, out=least)

@@ -10,7 +10,7 @@ from ...arrays import Integer
 from ...errors import SeipError
 from ...progress import Progress
 from .instance import Instance
-from .integer_program import Expression, PlacementProgram
+from .integer_program import PlacementProgram
 from .problem import PlacementProblem
 from .search_limits import Work
 
@@ -35,14 +35,8 @@ def serving_choice(instance: Instance, solver: str) -> Generator[Progress, None,
     if len(instance.mandatory) == 0:
         return np.zeros(0, np.int64)
     members = np.flatnonzero(instance.mandatory.any(axis=0))
-    part = instance.of(members)
-    program = PlacementProgram(part)
-    program.model += program.number <= len(part.mandatory)
-    # of all choices one with a large value of each sensor, as a start for the search
-    separately = part.gains(np.zeros(0, dtype=np.int64))
-    scaled = program.number_among(np.arange(len(part)), 1e4 / max(float(separately.max()), 1e-12) * separately)
-    chosen = yield from _decide(program, scaled, solver)
-    return None if chosen is None else members[chosen]
+    fewest = yield from _least(instance.of(members), solver)
+    return None if fewest is None else members[fewest]
 
 
 def _why_infeasible(problem: PlacementProblem, part: Instance, solver: str) -> Generator[Progress, None, str]:
@@ -72,13 +66,5 @@ def _why_infeasible(problem: PlacementProblem, part: Instance, solver: str) -> G
 def _least(part: Instance, solver: str, *, by_price: bool = False) -> Generator[Progress, None, Integer | None]:
     """Return the smallest or cheapest choice that serves all groups, if there is one."""
     program = PlacementProgram(part)
-    return (yield from _decide(program, -1 * (program.price if by_price else program.number), solver))
-
-
-def _decide(program: PlacementProgram, objective: Expression, solver: str) -> Generator[Progress, None, Integer | None]:
-    """Return the choice of largest objective that is feasible in exact arithmetic, or None where there is none."""
-    while True:
-        outcome = yield from program.maximise(objective, solver, Work(math.inf))
-        if outcome.chosen is None or program.instance.feasible(outcome.chosen):
-            return outcome.chosen
-        program.exclude(outcome.chosen)  # solvers have tolerances of their own
+    objective = -1 * (program.price if by_price else program.number)
+    return (yield from program.maximise(objective, solver, Work(math.inf))).chosen

@@ -44,7 +44,7 @@ class Incumbent:
         goal: float = -math.inf,
     ) -> None:
         self.instance, self.work = instance, work
-        self._describe, self._goal = describe, goal
+        self._describe, self.goal = describe, goal
         self.chosen: Integer = np.zeros(0, dtype=np.int64)
         self.value, self.bound = -math.inf, math.inf
         self._best = ""
@@ -53,29 +53,28 @@ class Incumbent:
     @property
     def least_better(self) -> float:
         """Least value of a better placement: lower bounds than this are proof enough."""
-        return max(self.value + self.instance.step, self._goal)
+        return max(self.value + self.instance.step, self.goal)
 
     def close(self) -> None:
         """Record that no placement is better."""
         self.bound = max(self.value, self.least_better - self.instance.step)
 
-    def offer(self, chosen: Integer) -> bool:
+    def offer(self, chosen: Integer) -> None:
         """Take a placement if it is feasible and of a larger value, or as good with fewer or cheaper sensors."""
         chosen = np.sort(np.asarray(chosen, dtype=np.int64))
         if not self.instance.feasible(chosen):
-            return False
+            return
         value = self.instance.value(chosen)
         if value <= self.value + self.instance.slack and not (
             value >= self.value and self._effort(chosen) < self._effort(self.chosen)
         ):
-            return False
+            return
         self.chosen, self.value = chosen, value
-        if value >= self._goal > -math.inf:
+        if value >= self.goal > -math.inf:
             self.work.end()
         if self._describe is not None:
             poses = self.instance.original[chosen]
             self._best, self._poses = self._describe(poses, value * self.instance.unit), tuple(poses.tolist())
-        return True
 
     @property
     def proven(self) -> bool:

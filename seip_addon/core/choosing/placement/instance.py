@@ -22,7 +22,6 @@ MAX_SINGLE_TOTAL = 20_000.0  # total of whole weights up to which single precisi
 MAX_DOUBLE = 20_000_000  # entries of A up to which several blocks together are kept in double precision
 WHOLE_SLACK = 0.25  # whole weights differ by one or not at all
 BINARY_PARTS = 16  # whole numbers, halves and so on up to this have a common unit
-DENOMINATORS = range(1, 13)  # a common unit of all weights is sought among these parts of the smallest one
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -84,13 +83,8 @@ class Instance:
         )
 
     @property
-    def operations(self) -> float:
-        """Number of multiplications that take as long as the gains of all candidates."""
-        return sum(block.operations for block in self.blocks)
-
-    @property
     def update_operations(self) -> float:
-        """The same for gains that follow others of similar placements."""
+        """Number of multiplications that take as long as all gains, after those of a similar choice."""
         return sum(block.update_operations for block in self.blocks)
 
     @property
@@ -246,14 +240,9 @@ def common_unit(weights: Float) -> tuple[float, bool]:
     weights : (n,) float64
         Positive.
     """
-    total = math.fsum(weights)
     parts = weights * BINARY_PARTS
-    if total * BINARY_PARTS <= MAX_EXACT and np.array_equal(np.rint(parts), parts):
+    if math.fsum(weights) * BINARY_PARTS <= MAX_EXACT and np.array_equal(np.rint(parts), parts):
         return float(np.gcd.reduce(parts.astype(np.int64))) / BINARY_PARTS, True
-    for share in DENOMINATORS:
-        unit = float(weights.min()) / share
-        if total / unit <= MAX_EXACT and np.array_equal(np.rint(weights / unit) * unit, weights):
-            return unit, True
     return 1.0, False
 
 

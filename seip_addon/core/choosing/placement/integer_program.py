@@ -1,16 +1,12 @@
-r"""Placement problems as integer programs, solved through PuLP.
-
-The concave value g is the minimum of lines :math:`a_k + b_k x`, or lies at most ε below it:
+r"""The maximal covering location problem as an integer program, solved through PuLP.
 
 .. math::
     \max \sum_t w_t v_t \quad\text{subject to}\quad
-    x_t = \sum_i A_{it} s_i, \quad v_t \le a_k + b_k x_t \;\; \forall k, \quad
+    v_t \le \sum_i A_{it} s_i, \quad 0 \le v_t \le 1, \quad
     \sum_i s_i \le N, \quad \sum_i p_i s_i \le B, \quad s_i \in \{0, 1\},
 
-with the further constraints of `PlacementProblem`. For coverage these are :math:`v_t \le x_t` and :math:`v_t \le 1`,
-the vanilla and weighted programs of the SEIP paper, whose v are whole at an optimum. For the logarithm the lines are
-tangents, so that the program has an upper bound; tangents at the amounts of each placement that it finds are added
-(outer approximation: Duran and Grossmann 1986).
+with the further constraints of `PlacementProblem`: the vanilla and weighted programs of the SEIP paper, whose v are
+whole at an optimum.
 """
 
 from __future__ import annotations
@@ -48,7 +44,6 @@ Expression = Any  # of PuLP, which has no types
 TOTAL_VALUE = 1e4  # largest value in a program: far above the solvers' absolute tolerances of 1e-6
 TOLERANCE = 2e-6  # share of the largest value that a solver's tolerances of 1e-6 may add up to, doubled
 MAX_ENTRIES = 1_000_000  # entries of A up to which a program is built: PuLP takes 0.5 kB for each
-MAX_REJECTED = 100  # placements in a row that a solver cannot tell from a better one, before giving up
 OPERATIONS_PER_ENTRY = 2.5e4  # multiplications per entry of a program that count as the work of one branch of a solver
 LATEST = 1.5  # seconds per unit of work after which a solver ends that a user has named
 CALL_OPERATIONS = 3e7  # multiplications that take as long as handing the smallest program to a solver
@@ -117,31 +112,24 @@ class PlacementProgram:
         self.instance = instance
         self.model = pulp.LpProblem("placement", pulp.LpMaximize)
         self.x = [self.model.add_variable(f"x{i}", cat=pulp.LpBinary) for i in range(len(instance))]
-        self.price = _linear(self.x, instance.price * self.price_scale)
+        # Scaled to 10,000 for the budget or the highest price, prices are far above the solvers' tolerances: what these
+        # let pass is within the tolerance of a budget, too.
+        most = instance.budget if math.isfinite(instance.budget) else float(instance.price.max(initial=0.0))
+        price = instance.price * (TOTAL_VALUE / most) if most > 0 else instance.price
+        self.price = _linear(self.x, np.minimum(price, 2 * TOTAL_VALUE))
         self.number = _linear(self.x, np.ones(len(self.x)))
         if instance.count < len(instance):
             self.model += self.number <= instance.count
         if math.isfinite(instance.budget):
-            self.model += self.price <= instance.budget * self.price_scale * (1 + TIE_TOLERANCE)
+            self.model += self.price <= (TOTAL_VALUE if most > 0 else 0.0) * (1 + TIE_TOLERANCE / 2)
         for group in instance.mandatory:
             self.model += self.number_among(np.flatnonzero(group)) >= 1
         for clique in _cover_by_cliques(instance.conflict):
             self.model += self.number_among(clique) <= 1
 
-    @property
-    def price_scale(self) -> float:
-        """Factor that scales the highest price to 10,000, far above the solvers' absolute tolerances."""
-        highest = float(self.instance.price.max(initial=0.0))
-        return 1e4 / highest if highest > 0 else 1.0
-
-    def number_among(self, candidates: Integer, factors: Float | None = None) -> Expression:
-        """Return the (weighted) number of sensors among some candidates."""
-        return _linear([self.x[i] for i in candidates], np.ones(len(candidates)) if factors is None else factors)
-
-    def exclude(self, chosen: Integer) -> None:
-        """Forbid a single choice."""
-        others = np.setdiff1d(np.arange(len(self.x)), chosen)
-        self.model += self.number_among(chosen) - self.number_among(others) <= len(chosen) - 1
+    def number_among(self, candidates: Integer) -> Expression:
+        """Return the number of sensors among some candidates."""
+        return _linear([self.x[i] for i in candidates], np.ones(len(candidates)))
 
     def maximise(
         self, objective: Expression, solver: str, work: Work, entries: int = 0
@@ -191,74 +179,46 @@ class PlacementProgram:
         return Outcome(chosen, _bound(self.model, solver), finished, _nodes(self.model, solver))
 
 
-class ConcaveProgram(PlacementProgram):
-    """The integer program of an instance with one block and no failures."""
+class CoverageProgram(PlacementProgram):
+    """The integer program of an instance with one block of coverage and no failures.
+
+    Attributes
+    ----------
+    entries : int
+        Number of pairs of a candidate and a target that it sees.
+    scale : float
+        Value in the program of one unit of the instance's.
+    margin : float
+        What the solver's tolerances may add up to, in units of the instance.
+    """
 
     def __init__(self, instance: Instance) -> None:
         super().__init__(instance)
-        (self._block,) = instance.blocks
-        amounts = self._block.amounts.astype(np.float64)
-        self.entries = int(np.count_nonzero(amounts))
-        most: Float = np.sort(amounts, axis=0)[-instance.count :].sum(axis=0)  # amounts that targets can have at most
-        self._x = [self.model.add_variable(f"a{t}", 0, top) for t, top in enumerate(most.tolist())]
-        self._v = [self.model.add_variable(f"v{t}", 0) for t in range(len(most))]
-        intercept, slope = self._block.g.lines(float(most.max()))
-        for v, x, column in zip(self._v, self._x, amounts.T, strict=True):
-            seen = np.flatnonzero(column)
-            self.model += x == self.number_among(seen, column[seen])
-            for a, b in zip(intercept.tolist(), slope.tolist(), strict=True):
-                self.model += v <= a + b * x
-        largest = float(self._block.weight @ self._block.g(most))
+        (block,) = instance.blocks
+        self.entries = int(np.count_nonzero(block.amounts))
+        covered = [self.model.add_variable(f"v{t}", 0, 1) for t in range(len(block.weight))]
+        for v, column in zip(covered, block.amounts.T, strict=True):
+            self.model += v <= self.number_among(np.flatnonzero(column))
+        largest = float(block.weight.sum())
         self.scale, self.margin = TOTAL_VALUE / largest, TOLERANCE * largest
-        self.objective = _linear(self._v, self._block.weight * self.scale)
-
-    def require(self, value: float) -> None:
-        """Require an objective value, lowered by what a solver may miss it by."""
-        self.model += self.objective >= (value - self.margin) * self.scale
-
-    def add_tangents(self, chosen: Integer) -> None:
-        """Add the tangents at the amounts of a choice, where the program has its value exactly from then on."""
-        for v, x, at in zip(self._v, self._x, self._block.together(chosen).tolist(), strict=True):
-            self.model += v <= math.log1p(at) - at / (1.0 + at) + x / (1.0 + at)
+        self.objective = _linear(covered, block.weight * self.scale)
 
 
-def prove_by_program(incumbent: Incumbent, among: Integer, solver: str, work: Work) -> Generator[Progress, None, bool]:
-    """Find better placements of some candidates by an integer program until there is none, or the work is done.
+def prove_by_program(incumbent: Incumbent, among: Integer, solver: str, work: Work) -> Generator[Progress, None, None]:
+    """Improve the best placement and its bound by an integer program, within a limit of work.
 
-    Solvers have tolerances: of two placements that differ by less they may return either. So each placement that a
-    solver finds is evaluated exactly and excluded, and the program is solved again until it has no solution.
+    The bound is that of the solver, raised by what its tolerances may add up to: less than one unit of whole weights.
 
     Parameters
     ----------
     among : (n,) int64
-        Candidates that a better placement may contain.
-
-    Returns
-    -------
-    bool
-        Whether the best placement is proven.
+        Candidates of the best placement, and those that a better one may contain.
     """
-    program = ConcaveProgram(incumbent.instance.of(among))
-    linear = hasattr(program.instance.blocks[0].g, "rises")
-    program.require(incumbent.least_better)
-    for _ in range(MAX_REJECTED):
-        if work.left <= 0:
-            return False
-        outcome = yield from program.maximise(program.objective, solver, work, program.entries)
-        if outcome.chosen is None and outcome.finished:
-            incumbent.close()
-            return True
-        incumbent.bound = min(incumbent.bound, outcome.bound / program.scale + program.margin)
-        if incumbent.bound < incumbent.least_better:
-            return True
-        if outcome.chosen is None:
-            return False
-        program.exclude(outcome.chosen)
-        if not linear:
-            program.add_tangents(outcome.chosen)
-        if incumbent.offer(among[outcome.chosen]):
-            program.require(incumbent.least_better)
-    return False
+    program = CoverageProgram(incumbent.instance.of(among))
+    outcome = yield from program.maximise(program.objective, solver, work, program.entries)
+    if outcome.chosen is not None:
+        incumbent.offer(among[outcome.chosen])
+    incumbent.bound = max(incumbent.value, min(incumbent.bound, outcome.bound / program.scale + program.margin))
 
 
 def _root_operations(entries: int) -> float:
@@ -271,9 +231,7 @@ def is_affordable(instance: Instance, work: Work) -> bool:
 
     A solver cannot be stopped by counted work within a relaxation, and PuLP takes long to build a large program.
     """
-    (block,) = instance.blocks
-    lines = len(block.g.lines(float(block.together(np.arange(len(block))).max(initial=0.0)))[0])
-    entries = int(np.count_nonzero(block.amounts)) + (lines - 2) * 2 * len(block.weight)
+    entries = int(np.count_nonzero(instance.blocks[0].amounts))
     return entries <= MAX_ENTRIES and _root_operations(entries) <= work.left * OPERATIONS_PER_UNIT
 
 

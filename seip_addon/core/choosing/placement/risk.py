@@ -1,15 +1,9 @@
 r"""Risk measures of robust placement: expectation, worst case, CVaR, failures.
 
-In scenario k the chosen sensors S see target j :math:`n_{jk}(S)` times. The
-outcome of the scenario is the weight of the targets seen,
-
-.. math::
-    f_k(S) = \sum_j w_j\, [n_{jk}(S) \ge 1],
-
-or what is left of it after the failure of one sensor: at worst :math:`\min_{i \in S} f_k(S \setminus i)`, or on
-average, where each of the N sensors that are allowed is equally likely to fail (if only chosen sensors could fail,
-adding a sensor that sees nothing would raise the average). The risk measure is the mean of the m smallest of K
-outcomes, :math:`m = \lceil αK \rceil`:
+The outcome :math:`f_k(S)` of scenario k is the weight of the targets that the chosen sensors S see, or what is left of
+it after the failure of one of them: at worst, or on average, where each of the N sensors that are allowed is equally
+likely to fail (if only chosen sensors could fail, adding a sensor that sees nothing would raise the average). The risk
+measure is the mean of the m smallest of K outcomes, :math:`m = \lceil αK \rceil`:
 
 .. math::
     T(S) = \min_{p \in P} \sum_k p_k f_k(S), \qquad

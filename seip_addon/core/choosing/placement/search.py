@@ -56,7 +56,7 @@ class Search:
         self.instance = incumbent.instance if among is None else incumbent.instance.of(among)
         self._random = np.random.default_rng(seed)
         instance = self.instance
-        mixed = math.isfinite(instance.budget) and np.ptp(instance.price) > 0
+        mixed = (math.isfinite(instance.budget) or math.isfinite(incumbent.goal)) and np.ptp(instance.price) > 0
         self.powers = PRICE_POWERS if mixed else (0.0,)
         price = np.maximum(instance.price, TIE_TOLERANCE * max(float(instance.price.max()), TIE_TOLERANCE))
         self._divisors = {power: price**power for power in (*self.powers, 1.0)}
@@ -152,11 +152,13 @@ class Search:
         return (yield from self.filled(kept, power))
 
     def filled(
-        self, chosen: Integer, power: float, phase: str = "improving the placement", enough: float = math.inf
+        self, chosen: Integer, power: float, phase: str = "improving the placement"
     ) -> Generator[Progress, None, Integer]:
-        """Add the candidate of largest gain, by a power of the price, until none can be added or a value is reached."""
-        instance = self.instance
-        while (self.incumbent.work.left > 0 or self.incumbent.value == -math.inf) and instance.value(chosen) < enough:
+        """Add the candidate of largest gain, by a power of the price, until none is left or the goal is reached."""
+        instance, goal = self.instance, self.incumbent.goal
+        while (self.incumbent.work.left > 0 or self.incumbent.value == -math.inf) and (
+            goal == -math.inf or instance.value(chosen) < goal
+        ):
             addable = instance.addable(chosen)
             if not addable.any():
                 break

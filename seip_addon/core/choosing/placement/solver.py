@@ -14,8 +14,8 @@ from ...arrays import Float, Integer
 from ...counts import counted
 from ...errors import SeipError
 from ...progress import Progress, finish, within
-from .branch_and_bound import BranchAndBound
-from .concave import Steps
+from .branch_and_bound import BranchAndBound, GainSearch
+from .concave import Steps, StepSum
 from .feasibility import starting_choice
 from .incumbent import Incumbent
 from .instance import Instance, make_instance
@@ -25,12 +25,11 @@ from .risk import NOMINAL, Risk
 from .search import Search, without_idle
 from .search_limits import DEFAULT_LIMITS, SolverLimits, Work
 
-QUICK_SHARE, GREEDY_SHARE = 0.04, 0.95
-"""Shares of what is left for branch and bound by gains only, before and after the restarts."""
-GREEDY_SENSORS = 5  # sensors up to which that often ends with a proof
-RESTART_SHARE = 0.6  # share of what is left for restarts
-SCENARIO_SHARE = 0.3  # the same over scenarios, whose placements begin from the nominal optimum
-ROUNDS = 8  # rounds of fictitious play for the shares of scenarios
+RESTART_SHARE, SHORT_SHARE = 0.6, 0.3
+"""Shares of what is left for restarts; the second one over scenarios, whose placements begin from the nominal optimum,
+and for few sensors, of which all placements can be searched."""
+FEW_SENSORS, GAIN_SHARE = 5, 0.95
+"""Sensors up to which a search by gains often ends with a proof, and its share of what is left."""
 PROGRAM_SHARE = 0.5  # share of what is left then for an integer program
 TIGHT_GAP = 0.01  # largest gap at which an integer program is tried without being asked for
 MORE = 2  # sensors beyond those of a placement, up to which `front_of` goes
@@ -52,10 +51,10 @@ def solve(
 ) -> Generator[Progress, None, Placement]:
     """Choose the placement of largest value.
 
-    A greedy choice improved by swaps is there at once. Then a linear bound and branch and bound on it, which prove many
-    problems; restarts of the search for as long as they find better placements; and branch and bound again, up to the
-    limit of work. Of equally good placements the first one found is kept, unless a later one has fewer sensors or a
-    lower price. The result does not depend on the order of candidates and targets.
+    A greedy choice improved by swaps is there at once. Then follow a linear bound; restarts of the search for as long
+    as they find better placements; for few sensors a search by gains, which proves many problems; and branch and bound
+    on the linear bound, up to the limit of work. Of equally good placements the first one found is kept, unless a later
+    one has fewer sensors or a lower price. The result does not depend on the order of candidates and targets.
 
     Values are equal if they differ by less than rounding: whole weights are compared exactly, other values to a
     billionth of the total weight.
@@ -115,19 +114,20 @@ def search_and_prove(
     yield from search.first()
     if known is not None:
         yield from search.adapt(np.flatnonzero(np.isin(instance.original, known)))
-    branches, name = BranchAndBound(incumbent, instance.relaxed(_shares(incumbent))), "branch and bound"
+    block = instance.relaxed(_shares(incumbent))
+    branches, name = BranchAndBound(incumbent, block), "branch and bound"
     promise = yield from branches.start()
     if incumbent.proven:
         return name
-    few = instance.count <= GREEDY_SENSORS
-    if few and (yield from branches.run_greedily(QUICK_SHARE)):
-        return name
-    yield from search.restarts((RESTART_SHARE if instance.is_plain else SCENARIO_SHARE) * work.left, promise)
-    if few and (yield from branches.run_greedily(GREEDY_SHARE)):
+    few = instance.count <= FEW_SENSORS and math.isinf(instance.budget)
+    by_gains = GainSearch(incumbent, block) if few and isinstance(block, StepSum) else None
+    share = RESTART_SHARE if instance.is_plain and by_gains is None else SHORT_SHARE
+    yield from search.restarts(share * work.left, promise)
+    if by_gains is not None and (yield from by_gains.run(branches.left(), GAIN_SHARE)):
         return name
     rest, part = branches.left(), work.part(PROGRAM_SHARE * work.left)
-    tight = isinstance(instance.blocks[0].g, Steps) and incumbent.gap <= TIGHT_GAP
-    if instance.is_plain and (tight or solver != "auto") and is_affordable(instance.of(rest), part):
+    linear = instance.is_plain and isinstance(instance.blocks[0].g, Steps)
+    if linear and (incumbent.gap <= TIGHT_GAP or solver != "auto") and is_affordable(instance.of(rest), part):
         name = f"{name}, {check_solver(solver)}"
         yield from prove_by_program(incumbent, rest, solver, part)
     if not incumbent.proven:
@@ -136,26 +136,15 @@ def search_and_prove(
 
 
 def _shares(incumbent: Incumbent) -> Float:
-    """Return the shares of the blocks for a small bound on the risk measure, (K,) float64, by fictitious play.
+    """Return shares of the blocks for a bound on the risk measure, (K,) float64: the worst ones of the best placement.
 
-    Any shares of at most 1/m that add up to 1 give a bound. An opponent adds the worst blocks of each placement, and
-    greedy choices answer the shares so far (Brown 1951).
+    Any shares of at most 1/m that add up to 1 give a bound.
     """
-    instance, risk = incumbent.instance, incumbent.instance.risk
-    blocks = len(instance.blocks)
-    if risk.counted(blocks) == blocks:
-        return np.full(blocks, 1.0 / blocks)
-    shares, chosen = np.zeros(blocks), incumbent.chosen
-    for _ in range(ROUNDS):
-        outcomes = np.array([block.value(chosen) for block in instance.blocks])
-        shares[risk.worst(outcomes)] += 1.0
-        chosen = np.zeros(0, dtype=np.int64)
-        while (addable := instance.addable(chosen)).any() and incumbent.work.left > 0:
-            gains = np.stack([block.gains(block.together(chosen)) for block in instance.blocks])
-            incumbent.work.spend(instance.operations)
-            chosen = np.append(chosen, int(np.argmax(np.where(addable, shares @ gains, -1.0))))
-    normalised: Float = shares / shares.sum()
-    return normalised
+    outcomes = np.array([block.value(incumbent.chosen) for block in incumbent.instance.blocks])
+    worst = incumbent.instance.risk.worst(outcomes)
+    shares = np.zeros(len(outcomes))
+    shares[worst] = 1.0 / len(worst)
+    return shares
 
 
 def placement_of(problem: PlacementProblem, incumbent: Incumbent, solver: str) -> Placement:

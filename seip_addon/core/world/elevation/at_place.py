@@ -44,6 +44,7 @@ GROUND = 2  # class of ground points in a survey
 TRAFFIC_MARGIN = 1.0  # metres around the carriageway within which unclassified points are traffic
 MIN_COVERED = 0.5  # least share of the place with known heights; otherwise the file belongs to a different place
 FLAT, MIN_FLAT = 0.25, 0.6  # a map is flat if at least this share of its lanes is within this (metres) of one height
+_SEED = 20_241
 
 
 @dataclass(frozen=True)
@@ -157,9 +158,6 @@ def with_terrain(
         notes.append(f"{counted(dropped, 'building')} of the extract replaced by those of the survey")
     relief = Relief(smooth, level) if is_flat else None
     return replace(description, relief=relief, solids=(*description.solids, *added)), tuple(notes), tried
-
-
-_SEED = 20_241
 
 
 def _heights_note(path: Path, smooth: HeightRaster) -> str:

@@ -27,6 +27,12 @@ PIXEL = Limits(1e-9, 1e5)
 _METRE, _NOT_SAID, _OWN = 9001, 0, 32767
 _BROKEN = (OSError, SyntaxError, ValueError, TypeError, KeyError, IndexError, struct.error, EOFError, OverflowError)
 """Exceptions that Pillow raises for damaged files."""
+_TAGS = (_SCALE, _TIE_POINT, _TRANSFORMATION, _KEYS, _NO_DATA, _COPYRIGHT)
+_CONVERT = (
+    "write it again (gdal_translate -co COMPRESS=DEFLATE -co PREDICTOR=1 in.tif out.tif, or gdalwarp -t_srs EPSG:…)"
+)
+_PROJECTED_CODES = Limits(1024, 32766)
+"""EPSG codes that a GeoTIFF key may contain."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,16 +125,6 @@ def read_geotiff(path: Path) -> GeoTiff:
     if not np.isfinite(values).any():
         raise SeipError(f"{name} has no height between {GROUND.least:g} and {GROUND.most:g} m: give heights in metres")
     return GeoTiff(name, epsg, corner, step, values, one_line(str(tags[_COPYRIGHT] or "")))
-
-
-_TAGS = (_SCALE, _TIE_POINT, _TRANSFORMATION, _KEYS, _NO_DATA, _COPYRIGHT)
-_CONVERT = (
-    "write it again (gdal_translate -co COMPRESS=DEFLATE -co PREDICTOR=1 in.tif out.tif, or gdalwarp -t_srs EPSG:…)"
-)
-
-
-_PROJECTED_CODES = Limits(1024, 32766)
-"""EPSG codes that a GeoTIFF key may contain."""
 
 
 class _UnplacedError(ValueError):

@@ -9,6 +9,17 @@ import numpy as np
 from ...arrays import Float
 from ..opendrive.objects import TUNNEL, PlacedObject
 
+FLAT_KINDS = {TUNNEL, "crosswalk", "parkingspace", "roadmark", "roadsurface", "patch"}
+UNTYPED = {"-1", "none", ""}  # types without meaning: name and shape decide
+VAGUE_TYPES = UNTYPED | {"obstacle"}  # types for which name and shape are more specific
+SIGNAL_WORDS = {"signal", "signals", "traffic", "trafficlight", "light", "ampel", "mast", "gantry", "signalpole"}
+"""Words in the name of a post that carries traffic lights."""
+SIGN_WORDS = {"sign", "signs", "schild", "verkehrszeichen", "speed"}
+MIN_HEIGHT = 0.01
+"""Metres: lower heights count as not given in the map."""
+MIN_POST_HEIGHT, MAX_POST_THICKNESS, MIN_POST_SLENDERNESS = 2.0, 0.6, 6.0
+"""Least height and greatest thickness of a post (metres), and least ratio of the two."""
+
 
 class Kind(Enum):
     """Kinds of objects that are modelled."""
@@ -24,7 +35,6 @@ class Kind(Enum):
     OTHER = "other"
 
 
-FLAT_KINDS = {TUNNEL, "crosswalk", "parkingspace", "roadmark", "roadsurface", "patch"}
 KIND_OF_TYPE = {
     "tree": Kind.TREE,
     "vegetation": Kind.PLANTS,
@@ -33,8 +43,6 @@ KIND_OF_TYPE = {
     "streetlamp": Kind.LAMP,
     "building": Kind.BUILDING,
 }
-UNTYPED = {"-1", "none", ""}  # types without meaning: name and shape decide
-VAGUE_TYPES = UNTYPED | {"obstacle"}  # types for which name and shape are more specific
 
 WORDS_OF_KIND = {
     Kind.LAMP: {"lamp", "lamps", "streetlamp", "streetlight", "lantern", "luminaire", "laterne", "leuchte"},
@@ -46,15 +54,6 @@ WORDS_OF_KIND = {
     Kind.POST: {"pole", "post", "mast", "column", "gantry", "ampel", "trafficlight", "pfosten", "signalpole"},
     Kind.BUILDING: {"building", "house", "haus", "gebaeude", "garage", "church", "school"},
 }
-SIGNAL_WORDS = {"signal", "signals", "traffic", "trafficlight", "light", "ampel", "mast", "gantry", "signalpole"}
-"""Words in the name of a post that carries traffic lights."""
-SIGN_WORDS = {"sign", "signs", "schild", "verkehrszeichen", "speed"}
-
-MIN_HEIGHT = 0.01
-"""Metres: lower heights count as not given in the map."""
-
-MIN_POST_HEIGHT, MAX_POST_THICKNESS, MIN_POST_SLENDERNESS = 2.0, 0.6, 6.0
-"""Least height and greatest thickness of a post (metres), and least ratio of the two."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -25,6 +25,10 @@ DESCRIPTION_SUFFIX = ".toml"
 MAX_SIZE, MAX_RADIUS = limits.SIZE.most, limits.SITE_RADIUS.most  # metres
 MIN_AREA = 1e-4  # square metres below which an outline encloses nothing
 MAX_ROW_LENGTH = 10_000  # limit on the trees or lights of a row
+_SIZE = number(limits.SIZE)
+_HEIGHT = number(limits.HEIGHT)
+_EXTENT = Key(number(limits.SITE_RADIUS), None)
+_ARM = number(limits.DISTANCE)
 
 
 def read_site_description(path: Path) -> SiteDescription:
@@ -219,17 +223,10 @@ def _positions(row: Mapping[str, Any]) -> Float:
     return positions
 
 
-_SIZE = number(limits.SIZE)
-
-_HEIGHT = number(limits.HEIGHT)
-
-_EXTENT = Key(number(limits.SITE_RADIUS), None)
-
 _ROW = {"position": Key(_point, None), "from": Key(_point, None), "to": Key(_point, None), "spacing": Key(_SIZE, None)}
 
 _POLE = _ROW | {"heading": Key(number(limits.DEGREES), None)}
 
-_ARM = number(limits.DISTANCE)
 
 _AREA = {"name": Key(text, "Area"), "polygon": Key(_outline)}
 

@@ -31,6 +31,8 @@ _ROWS_ALONG = 2  # positions for a row of cars along the kerb of a street, one b
 # many seeds, all positions have been used.
 _SHIFT = 0.26
 _PARKING_SECONDS = 1e6  # seconds
+VEHICLE_SHARES = {"car": 0.58, "van": 0.13, "truck": 0.10, "bus": 0.06, "motorcycle": 0.07, "bicycle": 0.06}
+"""Shares of the vehicles that enter on each arm."""
 
 
 class RoadUserModel(NamedTuple):
@@ -83,9 +85,6 @@ MODELS = {
     },
 }
 """Sizes of road users in European cities, riders included; after makers' data sheets, rounded."""
-
-VEHICLE_SHARES = {"car": 0.58, "van": 0.13, "truck": 0.10, "bus": 0.06, "motorcycle": 0.07, "bicycle": 0.06}
-"""Shares of the vehicles that enter on each arm."""
 
 
 Bay = tuple[NetworkEdge, NetworkLane, float]

@@ -5,18 +5,10 @@ import math
 from dataclasses import replace
 
 import numpy as np
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from seip_addon.core.choosing.placement.bounds import (
-    bound_at,
-    compositions,
-    falling_bounds,
-    first_bound,
-    least_price,
-    rest_of,
-)
+from seip_addon.core.choosing.placement.bounds import bound_at, compositions, falling_bounds, rest_of
 from seip_addon.core.choosing.placement.instance import make_instance
 from seip_addon.core.errors import SeipError
 from tests.builders.placement_problems import all_choices, random_problem, row_problem
@@ -52,7 +44,8 @@ def test_no_choice_exceeds_any_of_the_falling_bounds_nor_those_of_its_candidates
         begin = bound_at(block, rest, base, block.start(base), block.rounding)
         steps = falling_bounds(block, rest, base, begin, 0.0, block.rounding)
         values = []
-        for bound in (first_bound(block, rest, base, block.rounding), begin, *itertools.islice(steps, 40)):
+        lowest = bound_at(block, rest, base, block.lowest(base), block.rounding)
+        for bound in (lowest, begin, *itertools.islice(steps, 40)):
             forced = bound.forced()
             for one in within:
                 assert value[tuple(one)] <= bound.value
@@ -80,20 +73,3 @@ def test_compositions_of_two_prices():
     assert sorted(one.quota for one in compositions(instance)) == [(2, 1), (3, 0)]
     assert sorted(one.quota for one in compositions(replace(instance, budget=26.0))) == [(1, 1), (3, 0)]
     assert compositions(replace(instance, budget=math.inf)) == []
-
-
-@pytest.mark.parametrize("share", [0.3, 0.6])
-@cases(60)
-@given(st.integers(0, 10**9))
-def test_no_choice_that_reaches_a_value_costs_less_than_the_least_price(share, seed):
-    instance = small_instance(seed, False, budget=None, mandatory=None, count=5, positions=np.arange(9))
-    (block,) = instance.blocks
-    goal = share * float(block.weight.sum())
-    prices = [math.fsum(instance.price[one]) for one in all_choices(instance) if instance.value(one) >= goal]
-    rest = replace(
-        rest_of(instance, np.zeros(0, dtype=np.int64), np.arange(len(instance))), budget=min(prices, default=20.0)
-    )
-    base = np.zeros(len(block.weight))
-    bound = bound_at(block, rest, base, block.start(base), block.rounding)
-    for lower in itertools.islice(falling_bounds(block, rest, base, bound, goal, block.rounding), 20):
-        assert least_price(rest, lower, goal) <= min(prices, default=math.inf) + 1e-6

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from seip_addon.core.choosing.placement import branch_and_bound
-from seip_addon.core.choosing.placement.branch_and_bound import BranchAndBound
+from seip_addon.core.choosing.placement.branch_and_bound import BranchAndBound, GainSearch
 from seip_addon.core.choosing.placement.incumbent import Incumbent
 from seip_addon.core.choosing.placement.instance import make_instance
 from seip_addon.core.choosing.placement.risk import Risk
@@ -20,11 +20,9 @@ from tests.oracles.random_cases import cases
 
 SHORTCUTS = {
     "usual": {},
-    "children of small problems": {"FEW": 0},
-    "no lists": {"FEW": 0, "LISTED": 0},
-    "few at once": {"FEW": 0, "LISTED": 0, "MAX_PAIRS": 1},
-    "no steps": {"ROOT_STEPS": 0, "NODE_STEPS": 0, "FEW": 0},
-    "one stage": {"LEAST_GAP": 1.0, "FEW": 0},
+    "few at once": {"MAX_PAIRS": 1},
+    "no steps": {"ROOT_STEPS": 0, "NODE_STEPS": 0},
+    "one stage": {"LEAST_GAP": 1.0},
 }
 
 
@@ -95,6 +93,22 @@ def test_a_search_that_was_stopped_can_go_on(seed, returns):
         assert np.isin(incumbent.chosen, search.left()).all()
     assert incumbent.proven
     assert incumbent.value == pytest.approx(best, abs=2 * incumbent.instance.slack)
+
+
+@pytest.mark.parametrize("at_once", [1, 4_000_000])
+@cases(60)
+@given(st.integers(0, 10**6), st.floats(0.0, 1.0))
+def test_a_search_by_gains_finds_the_best_value_or_is_not_finished(at_once, seed, units):
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(branch_and_bound, "MAX_PAIRS", at_once)
+        incumbent, _, best = poor_start(seed)
+        gains, every = GainSearch(incumbent, incumbent.instance.relaxed(np.ones(1))), np.arange(len(incumbent.instance))
+        incumbent.work = Work(0.1 * units)
+        assert finish(gains.run(every, 1.0)) == incumbent.proven
+        incumbent.work = Work(math.inf)
+        assert incumbent.proven or finish(gains.run(every, 1.0))
+    assert incumbent.value == pytest.approx(best, abs=2 * incumbent.instance.slack)
+    assert incumbent.bound == pytest.approx(best, abs=2 * incumbent.instance.slack)
 
 
 @pytest.mark.usefixtures("_shortcuts")

@@ -11,11 +11,11 @@ import pulp.apis.coin_api
 import pytest
 
 from seip_addon.core.choosing.placement import integer_program
-from seip_addon.core.choosing.placement.branch_and_bound import BranchAndBound
 from seip_addon.core.choosing.placement.incumbent import Incumbent
 from seip_addon.core.choosing.placement.instance import make_instance
 from seip_addon.core.choosing.placement.integer_program import (
-    ConcaveProgram,
+    CoverageProgram,
+    PlacementProgram,
     check_solver,
     prove_by_program,
     solver_name,
@@ -34,52 +34,54 @@ def worst_of(instance, work=math.inf):
     return incumbent
 
 
-@pytest.mark.parametrize("returns", [False, True], ids=["coverage", "returns"])
 @pytest.mark.parametrize("solver", ["highs", "cbc"])
-def test_program_finds_and_proves_what_branch_and_bound_does(solver, returns):
+def test_program_finds_and_proves_the_best_of_all_choices(solver):
     compared = 0
     for seed in range(12):
-        instance = make_instance(random_problem(seed, returns=returns))
-        if not all_choices(instance):
+        instance = make_instance(random_problem(seed))
+        choices = all_choices(instance)
+        if not choices:
             continue
-        by_program, by_branching = worst_of(instance), worst_of(instance)
-        every = np.arange(len(instance))
-        assert finish(prove_by_program(by_program, every, solver, Work(math.inf)))
-        search = BranchAndBound(by_branching, instance.relaxed(np.ones(1)))
-        finish(search.start())
-        assert finish(search.run())
-        assert by_program.proven
-        assert by_program.value == pytest.approx(by_branching.value, abs=2 * instance.slack)
-        assert by_program.bound == pytest.approx(by_branching.bound, abs=2 * instance.slack)
-        compared += 1
-    assert compared > 8
+        incumbent, every = worst_of(instance), np.arange(len(instance))
+        finish(prove_by_program(incumbent, every, solver, Work(math.inf)))
+        assert incumbent.value == pytest.approx(max(map(instance.value, choices)), abs=CoverageProgram(instance).margin)
+        assert incumbent.proven or instance.step < 1
+        compared += incumbent.proven
+    assert compared > 3
 
 
-@pytest.mark.parametrize("returns", [False, True], ids=["coverage", "returns"])
 @pytest.mark.parametrize("solver", ["highs", "cbc"])
-def test_bound_of_an_unfinished_program_holds(solver, returns):
+def test_bound_of_an_unfinished_program_holds(solver):
     for seed in range(6):
-        instance = make_instance(random_problem(seed, returns=returns))
+        instance = make_instance(random_problem(seed))
         choices = all_choices(instance)
         if not choices:
             continue
         incumbent, part = worst_of(instance), Work(1e-9)
         finish(prove_by_program(incumbent, np.arange(len(instance)), solver, part))
-        assert part.left <= 0 or incumbent.proven
+        assert part.left <= 0
         assert incumbent.bound >= max(map(instance.value, choices)) - instance.slack
 
 
-@pytest.mark.parametrize("returns", [False, True], ids=["coverage", "returns"])
-def test_value_in_the_program_is_that_of_the_instance(returns):
-    instance = make_instance(random_problem(2, returns=returns))
+def test_value_in_the_program_is_that_of_the_instance():
+    instance = make_instance(random_problem(2))
     for choice in all_choices(instance)[1:6]:
-        program = ConcaveProgram(instance)
-        if returns:
-            program.add_tangents(choice)
+        program = CoverageProgram(instance)
         for number, x in enumerate(program.x):
             program.model += x == int(number in choice)
         outcome = finish(program.maximise(program.objective, "highs", Work(math.inf)))
         assert outcome.bound / program.scale == pytest.approx(instance.value(choice), abs=program.margin)
+
+
+@pytest.mark.parametrize("solver", ["highs", "cbc"])
+def test_choices_that_just_exceed_the_budget_are_not_feasible(solver):
+    """Two sensors of 0.1 and 0.2 cost 0.30000000000000004 in floats: within 0.3, but not within a billionth less."""
+    for budget, number in ((0.3, 2), (0.3 * (1 - 3e-9), 1)):
+        instance = make_instance(row_problem(np.eye(2), prices=np.array([0.1, 0.2]), budget=budget))
+        program = PlacementProgram(instance)
+        chosen = finish(program.maximise(program.number, solver, Work(math.inf))).chosen
+        assert len(chosen) == number
+        assert instance.feasible(chosen)
 
 
 def test_a_named_solver_proves_what_branch_and_bound_leaves(monkeypatch):
