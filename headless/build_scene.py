@@ -21,14 +21,14 @@ if not __package__:  # run as a file by `blender -P`
 from headless import runtime
 from headless.options import NUMBER, add_settings, new_parser
 
-from seip_addon.core.counts import counted
-from seip_addon.core.errors import SeipError
+from seip_addon.core.base.counts import counted
+from seip_addon.core.base.errors import SeipError
+from seip_addon.core.base.progress import finish
 from seip_addon.core.output.pictures.chart_style import MARKERS, colour, new_figure, save_chart, style_axes
 from seip_addon.core.output.pictures.palette import INK, SOFT_INK
-from seip_addon.core.progress import finish
+from seip_addon.core.programs.sumo_programs import NETWORK_SUFFIX
 from seip_addon.core.site.sources import source_lines
 from seip_addon.core.storage.files import locked_file
-from seip_addon.core.sumo_programs import NETWORK_SUFFIX
 from seip_addon.core.workflows.site_building import SiteRequest, build_site, save_map
 from seip_addon.core.world.elevation.at_place import TerrainRequest
 from seip_addon.core.world.elevation.obstacles import MAX_CHANGED, RAYS, Merging, chosen_merging

@@ -37,8 +37,8 @@ from headless.scanned_scene import read_scanned_scene
 
 import bpy
 
-from seip_addon.core.errors import SeipError
-from seip_addon.core.limits import TIME_STEP
+from seip_addon.core.base.errors import SeipError
+from seip_addon.core.base.limits import TIME_STEP
 from seip_addon.core.output.results.detection_record import SCHEMA
 from seip_addon.core.output.results.versions import versions
 from seip_addon.core.sensing.scans.simulation import ScanSettings

@@ -40,13 +40,13 @@ import shapely
 from PIL import Image
 from shapely.geometry.base import BaseGeometry
 
-from seip_addon.core.arrays import Boolean, Float
-from seip_addon.core.errors import SeipError
+from seip_addon.core.base.arrays import Boolean, Float
+from seip_addon.core.base.errors import SeipError
+from seip_addon.core.base.limits import Limits
+from seip_addon.core.base.progress import Progress
 from seip_addon.core.geometry.plan import outline, surface_height
-from seip_addon.core.limits import Limits
 from seip_addon.core.output.results.detection_record import RECORDING_SCHEMA
 from seip_addon.core.output.results.versions import versions
-from seip_addon.core.progress import Progress
 from seip_addon.core.sensing.lidar.catalogue import find_models, load_catalogue
 from seip_addon.core.sensing.lidar.model import LidarModel
 from seip_addon.core.sensing.recordings.box_labels import BoxLabels

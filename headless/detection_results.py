@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
-from seip_addon.core.arrays import Float
+from seip_addon.core.base.arrays import Float
 from seip_addon.core.output.datasets.formats import CLASSES, kitti_results, openpcdet_results, read_labels
 from seip_addon.core.output.results.detection_record import FORMATS
 from seip_addon.core.sensing.scans.sensor import MountedSensor

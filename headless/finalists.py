@@ -17,14 +17,14 @@ from headless.options import add_settings, add_weather, new_parser
 
 import bpy
 
+from seip_addon.core.base.errors import SeipError
 from seip_addon.core.choosing.placement.judgement import MEAN, Judgement
 from seip_addon.core.choosing.placement.objective import Objective, Solution
-from seip_addon.core.errors import SeipError
+from seip_addon.core.programs.sumo_programs import NETWORK_SUFFIX, find_sumo
 from seip_addon.core.sensing.lidar.catalogue import find_models, load_catalogue
 from seip_addon.core.sensing.traffic.trajectories import Trajectories
 from seip_addon.core.sensing.weather import weather_of
 from seip_addon.core.storage.files import save_json
-from seip_addon.core.sumo_programs import NETWORK_SUFFIX, find_sumo
 from seip_addon.core.workflows.finalists import (
     JudgementRequest,
     check_judged,

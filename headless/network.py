@@ -24,18 +24,18 @@ from headless.options import add_settings, new_parser, real_number, whole_number
 import numpy as np
 import shapely
 
-from seip_addon.core.arrays import Float
+from seip_addon.core.base.arrays import Float
+from seip_addon.core.base.counts import counted
+from seip_addon.core.base.errors import SeipError
+from seip_addon.core.base.limits import LATITUDE, LONGITUDE, PRICE, SENSORS, SHARE, SITE_RADIUS, Limits
+from seip_addon.core.base.progress import finish
 from seip_addon.core.choosing.placement.objective import Objective
-from seip_addon.core.counts import counted
-from seip_addon.core.dask_client import connected
-from seip_addon.core.errors import SeipError
-from seip_addon.core.limits import LATITUDE, LONGITUDE, PRICE, SENSORS, SHARE, SITE_RADIUS, Limits
 from seip_addon.core.output.network.write import write_network
-from seip_addon.core.progress import finish
+from seip_addon.core.programs.dask_client import connected
+from seip_addon.core.programs.sumo_programs import find_sumo
 from seip_addon.core.sensing.visibility.ray_casting import engine_name
 from seip_addon.core.site.installed_cost import DEFAULTS
 from seip_addon.core.storage.files import read_small
-from seip_addon.core.sumo_programs import find_sumo
 from seip_addon.core.workflows.network_sites import (
     APPROACHES,
     NetworkPlace,

@@ -24,13 +24,14 @@ from headless.network_tasks import (
 
 import numpy as np
 
-from seip_addon.core.arrays import Float
+from seip_addon.core.base.arrays import Float
+from seip_addon.core.base.errors import SeipError
+from seip_addon.core.base.progress import Progress
 from seip_addon.core.choosing.network import network_search
 from seip_addon.core.choosing.network.frontier import Frontier, SolvedBudget
 from seip_addon.core.choosing.network.network_search import Goal, NetworkAllocation, Request, search_allocations
 from seip_addon.core.choosing.network.site_problem import SiteProblem
 from seip_addon.core.choosing.placement.objective import Objective
-from seip_addon.core.errors import SeipError
 from seip_addon.core.output.network.network_record import (
     NetworkPoint,
     NetworkRecord,
@@ -38,7 +39,6 @@ from seip_addon.core.output.network.network_record import (
     NetworkSite,
     network_gap,
 )
-from seip_addon.core.progress import Progress
 from seip_addon.core.storage.files import digest, save_json, whole_file
 from seip_addon.core.storage.json_dataclass import as_json, from_json
 from seip_addon.core.storage.source_digest import source_digest

@@ -18,10 +18,10 @@ from headless.process_end import end_now
 
 import bpy
 
-from seip_addon.core.errors import SeipError
+from seip_addon.core.base.errors import SeipError
+from seip_addon.core.base.progress import Progress, finish
 from seip_addon.core.output.results.placement_record import Provenance
 from seip_addon.core.output.results.versions import versions
-from seip_addon.core.progress import Progress, finish
 from seip_addon.core.workflows.network_sites import divided
 from seip_addon.core.workflows.network_survey import site_problem, taken_solution
 from seip_addon.core.workflows.placing import with_context

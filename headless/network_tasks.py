@@ -12,11 +12,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from seip_addon.core.base.errors import SeipError
+from seip_addon.core.base.progress import finish
 from seip_addon.core.choosing.network.frontier import SolvedBudget
 from seip_addon.core.choosing.network.site_problem import SiteProblem
 from seip_addon.core.choosing.placement.objective import Objective
-from seip_addon.core.errors import SeipError
-from seip_addon.core.progress import finish
 from seip_addon.core.storage.source_digest import source_digest
 from seip_addon.core.workflows.network_sites import NetworkPlace
 from seip_addon.core.workflows.survey_settings import SurveySettings

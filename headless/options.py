@@ -17,10 +17,10 @@ from typing import Any, Literal, TypeVar, get_args, get_origin, get_type_hints
 
 from headless.removed import check_removed
 
-from seip_addon.core.counts import typed_number
-from seip_addon.core.errors import SeipError
-from seip_addon.core.limits import Limits
-from seip_addon.core.settings import Setting, settings_of
+from seip_addon.core.base.counts import typed_number
+from seip_addon.core.base.errors import SeipError
+from seip_addon.core.base.limits import Limits
+from seip_addon.core.base.settings import Setting, settings_of
 
 Options = TypeVar("Options")
 Number = TypeVar("Number", int, float)

@@ -25,14 +25,14 @@ from headless.options import add_settings, new_parser, read_settings, real_numbe
 
 import bpy
 
+from seip_addon.core.base.errors import SeipError
+from seip_addon.core.base.limits import CHOSEN_WEIGHT, Limits
+from seip_addon.core.base.progress import finish
 from seip_addon.core.choosing.placement.deployment import price_text
 from seip_addon.core.choosing.placement.judgement import DEFAULT_FINALISTS
 from seip_addon.core.choosing.placement.objective import Objective, Solution, check_objective
 from seip_addon.core.choosing.placement.returns_summary import NOT_BY_DETECTION, share_reached
 from seip_addon.core.choosing.placement.scenarios import ScenarioKind, Scenarios
-from seip_addon.core.errors import SeipError
-from seip_addon.core.limits import CHOSEN_WEIGHT, Limits
-from seip_addon.core.progress import finish
 from seip_addon.core.sensing.scenarios.pose_errors import PoseErrors
 from seip_addon.core.workflows.placing import place, with_context
 from seip_addon.core.workflows.survey import Layout

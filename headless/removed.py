@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from seip_addon.core.errors import SeipError
+from seip_addon.core.base.errors import SeipError
 
 _CONSTANT = "the value that it had by default is used; from Python, set it in the settings of a survey"
 _ERRORS = "give the standard deviations in metres and degrees as --pose-errors 0.3 2"

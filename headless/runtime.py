@@ -25,9 +25,9 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 from headless.process_end import end_without_freeing, handle
 from headless.system_libraries import complaint, missing_libraries
 
-from seip_addon.core.acceptance import Acceptance
-from seip_addon.core.errors import SeipError
-from seip_addon.core.progress import Progress, finish, progress_line, reporter
+from seip_addon.core.base.acceptance import Acceptance
+from seip_addon.core.base.errors import SeipError
+from seip_addon.core.base.progress import Progress, finish, progress_line, reporter
 from seip_addon.core.storage import files as storage
 from seip_addon.scene.interrupts import SIGNALS, held_signals
 

@@ -20,7 +20,7 @@ from headless.scanned_scene import read_scanned_scene
 
 import bpy
 
-from seip_addon.core.counts import counted
+from seip_addon.core.base.counts import counted
 from seip_addon.core.output.datasets.formats import FORMATS
 from seip_addon.core.output.datasets.sample import SPLITS
 from seip_addon.core.output.results.versions import versions

@@ -15,7 +15,7 @@ if not __package__:  # run as a file by `blender -P`
 
 from headless import runtime
 
-from seip_addon.core.errors import SeipError
+from seip_addon.core.base.errors import SeipError
 
 STUDIES = {
     "coverage": "coverage of sensor types × heights × numbers",

@@ -17,15 +17,15 @@ from headless.options import add_settings, add_weather, read_settings
 import bpy
 import numpy as np
 
+from seip_addon.core.base.counts import counted
+from seip_addon.core.base.progress import Progress, finish
+from seip_addon.core.base.settings import settings_of
 from seip_addon.core.choosing.placement.deployment import Sensor
 from seip_addon.core.choosing.placement.objective import Objective, Solution
-from seip_addon.core.counts import counted
 from seip_addon.core.output.results.placement_record import Provenance
 from seip_addon.core.output.results.versions import versions
-from seip_addon.core.progress import Progress, finish
 from seip_addon.core.sensing.visibility.triangle_culling import culling_message
 from seip_addon.core.sensing.weather import weather_of
-from seip_addon.core.settings import settings_of
 from seip_addon.core.site.candidates import CandidateSettings
 from seip_addon.core.site.installed_cost import DEFAULTS, load_installed_cost
 from seip_addon.core.site.site import Site

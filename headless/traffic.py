@@ -21,8 +21,8 @@ from headless.options import add_settings, new_parser, read_settings
 
 import bpy
 
-from seip_addon.core.counts import counted
-from seip_addon.core.errors import SeipError
+from seip_addon.core.base.counts import counted
+from seip_addon.core.base.errors import SeipError
 from seip_addon.core.sensing.traffic.floating_car_data import listed
 from seip_addon.core.sensing.traffic.source import TrafficFiles, describe_categories, load_traffic
 from seip_addon.core.sensing.traffic.trajectories import Trajectories

@@ -20,8 +20,8 @@ from headless.scanned_scene import read_scanned_scene
 
 import bpy
 
-from seip_addon.core.counts import counted
-from seip_addon.core.errors import SeipError
+from seip_addon.core.base.counts import counted
+from seip_addon.core.base.errors import SeipError
 from seip_addon.core.output.results.versions import versions
 from seip_addon.core.sensing.recordings.comparison import VEHICLE
 from seip_addon.core.sensing.recordings.recording import open_recording

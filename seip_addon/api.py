@@ -33,9 +33,9 @@ import os
 from collections.abc import Sequence
 from pathlib import Path
 
+from .core.base.progress import finish
 from .core.choosing.placement.objective import Objective, Solution
 from .core.choosing.placement.scenarios import Scenarios
-from .core.progress import finish
 from .core.sensing.scans.frame import Frame
 from .core.sensing.scans.simulation import ScanSettings
 from .core.sensing.scenarios.pose_errors import PoseErrors

@@ -11,12 +11,12 @@ from typing import Any, TypeVar
 
 import bpy
 
-from .core.errors import SeipError
+from .core.base.errors import SeipError
+from .core.programs.sumo_installation import BY_HAND, installed_sumo
+from .core.programs.sumo_programs import Sumo, find_sumo, sumo_version
 from .core.sensing.lidar.catalogue import load_catalogue
 from .core.sensing.lidar.model import LidarModel
 from .core.sensing.visibility.store import GridFolder
-from .core.sumo_installation import BY_HAND, installed_sumo
-from .core.sumo_programs import Sumo, find_sumo, sumo_version
 from .core.workflows.detection import DetectingPython
 from .core.world.openstreetmap.overpass import EXPORT, OVERPASS, OverpassServer
 

@@ -169,7 +169,7 @@ def _maps(_: Path) -> list[bytes]:
 
 
 def _read_map(path: Path, _: bytes) -> None:
-    from seip_addon.core.progress import finish  # noqa: PLC0415
+    from seip_addon.core.base.progress import finish  # noqa: PLC0415
     from seip_addon.core.world.opendrive.read import read_map  # noqa: PLC0415
     from seip_addon.core.world.streetscape.site_file import describe_place  # noqa: PLC0415
     from tests.builders.map_models import site_model  # noqa: PLC0415
@@ -215,7 +215,7 @@ def _mutate_floating_car_data(random: Random, content: bytes) -> bytes:
 
 
 def _read_floating_car_data(path: Path, content: bytes) -> None:
-    from seip_addon.core.progress import finish  # noqa: PLC0415
+    from seip_addon.core.base.progress import finish  # noqa: PLC0415
     from seip_addon.core.sensing.traffic.floating_car_data import read_floating_car_data, read_trajectories  # noqa: PLC0415
     from seip_addon.core.sensing.traffic.trajectories import Trajectories  # noqa: PLC0415
     from seip_addon.core.sensing.traffic.vehicle_types import BUILT_IN  # noqa: PLC0415
@@ -238,7 +238,7 @@ def _routes(_: Path) -> list[bytes]:
 
 
 def _read_routes(path: Path, content: bytes) -> None:
-    from seip_addon.core.progress import finish  # noqa: PLC0415
+    from seip_addon.core.base.progress import finish  # noqa: PLC0415
     from seip_addon.core.sensing.traffic.source import read_net_offset  # noqa: PLC0415
     from seip_addon.core.sensing.traffic.vehicle_types import read_vehicle_types  # noqa: PLC0415
 
@@ -360,7 +360,7 @@ def _mutate_survey(random: Random, content: bytes) -> bytes:
 
 
 def _read_survey(path: Path, _: bytes) -> None:
-    from seip_addon.core.progress import finish  # noqa: PLC0415
+    from seip_addon.core.base.progress import finish  # noqa: PLC0415
     from seip_addon.core.world.elevation.point_cloud import read_points, survey_system  # noqa: PLC0415
 
     require_physical(survey_system(path)[1], "middle", most=1e8)
@@ -395,7 +395,7 @@ def _mutate_extract(random: Random, content: bytes) -> bytes:
 
 
 def _read_extract(path: Path, _: bytes) -> None:
-    from seip_addon.core.progress import finish  # noqa: PLC0415
+    from seip_addon.core.base.progress import finish  # noqa: PLC0415
     from seip_addon.core.world.openstreetmap.extract import read_extract  # noqa: PLC0415
     from seip_addon.core.world.openstreetmap.quantities import count, metres  # noqa: PLC0415
 
@@ -559,7 +559,7 @@ def input_of(key: str, samples: list[bytes], seed: int, number: int) -> bytes:
 
 def outcome(key: str, content: bytes, folder: Path) -> str:
     """Read an input; return ``result``, ``refused``, or what is at fault, in one line."""
-    from seip_addon.core.errors import SeipError  # noqa: PLC0415
+    from seip_addon.core.base.errors import SeipError  # noqa: PLC0415
 
     path = folder / f"input{FORMATS[key].suffix}"
     path.write_bytes(content)

@@ -2,8 +2,8 @@
 
 import pytest
 
-from seip_addon.core.errors import SeipError
-from seip_addon.core.sumo_programs import find_sumo
+from seip_addon.core.base.errors import SeipError
+from seip_addon.core.programs.sumo_programs import find_sumo
 
 
 def _is_installed():

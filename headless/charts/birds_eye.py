@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from PIL import Image, ImageColor, ImageDraw, ImageFont
 from shapely.geometry.base import BaseGeometry
 
-from seip_addon.core.arrays import Boolean, Float
+from seip_addon.core.base.arrays import Boolean, Float
 from seip_addon.core.output.pictures.drawing import box_corners
 from seip_addon.core.output.pictures.palette import INK, PAPER, SENSOR_BODY, SOFT_INK
 

@@ -10,8 +10,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-from seip_addon.core.arrays import Float
-from seip_addon.core.errors import SeipError
+from seip_addon.core.base.arrays import Float
+from seip_addon.core.base.errors import SeipError
 from seip_addon.core.output.pictures.chart_style import (
     FAINT_COLOUR,
     colour,

@@ -12,12 +12,12 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LinearSegmentedColormap, Normalize
 from matplotlib.ticker import PercentFormatter
 
+from seip_addon.core.base.counts import counted
+from seip_addon.core.base.estimates import IntervalEstimate
 from seip_addon.core.choosing.placement.deployment import Deployment
 from seip_addon.core.choosing.placement.objective import Solution
 from seip_addon.core.choosing.robustness.comparison import Comparison, EvaluatedPlacement
 from seip_addon.core.choosing.robustness.pose_study import PoseStudy
-from seip_addon.core.counts import counted
-from seip_addon.core.estimates import IntervalEstimate
 from seip_addon.core.geometry.plan import closed, outline
 from seip_addon.core.output.pictures.chart_style import (
     DASHED,

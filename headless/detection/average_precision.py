@@ -7,10 +7,10 @@ from typing import TypeVar
 
 import numpy as np
 
-from seip_addon.core.arrays import Boolean, Float, Integer, Text
-from seip_addon.core.counts import counted
-from seip_addon.core.errors import SeipError
-from seip_addon.core.estimates import Interval, student_quantile
+from seip_addon.core.base.arrays import Boolean, Float, Integer, Text
+from seip_addon.core.base.counts import counted
+from seip_addon.core.base.errors import SeipError
+from seip_addon.core.base.estimates import Interval, student_quantile
 
 from .frame_results import FrameResult
 from .matching import Match, Rule, match

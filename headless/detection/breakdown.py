@@ -7,7 +7,7 @@ from headless.charts.detection import Bin
 
 import numpy as np
 
-from seip_addon.core.arrays import Boolean, Float, Integer
+from seip_addon.core.base.arrays import Boolean, Float, Integer
 
 from .average_precision import Evaluation, part
 

@@ -14,8 +14,8 @@ from pathlib import Path
 
 import numpy as np
 
-from seip_addon.core.arrays import Float
-from seip_addon.core.errors import SeipError
+from seip_addon.core.base.arrays import Float
+from seip_addon.core.base.errors import SeipError
 from seip_addon.core.storage.json_dataclass import read_record
 
 from .detector import Detector

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from seip_addon.core.arrays import Float
-from seip_addon.core.errors import SeipError
+from seip_addon.core.base.arrays import Float
+from seip_addon.core.base.errors import SeipError
 from seip_addon.core.geometry.height_raster import HeightRaster
 from seip_addon.core.geometry.plan import surface_height
 from seip_addon.core.sensing.scans.frame import Frame

@@ -18,7 +18,7 @@ from typing import Any
 import torch
 from torch import Tensor, nn
 
-from seip_addon.core.errors import SeipError
+from seip_addon.core.base.errors import SeipError
 from seip_addon.core.storage.array_file import READ_ERRORS
 from seip_addon.core.storage.files import digest, whole_file
 

@@ -7,9 +7,9 @@ from concurrent.futures import FIRST_EXCEPTION, ThreadPoolExecutor, wait
 from contextlib import closing
 from dataclasses import dataclass
 
-from seip_addon.core.errors import SeipError
+from seip_addon.core.base.errors import SeipError
+from seip_addon.core.base.progress import REPORT_INTERVAL, Progress, Result, finish
 from seip_addon.core.output.results.detection_record import Precision
-from seip_addon.core.progress import REPORT_INTERVAL, Progress, Result, finish
 from seip_addon.core.sensing.scans.frame import Frame
 
 from .average_precision import Evaluation, balanced_score, evaluate

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from seip_addon.core.arrays import Boolean
+from seip_addon.core.base.arrays import Boolean
 from seip_addon.core.sensing.scans.frame import STATIC_INSTANCE, Frame
 
 POINT_FIELDS = ("points", "sensor", "delay", "intensity", "instance", "foreground")

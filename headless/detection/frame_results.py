@@ -10,7 +10,7 @@ import shapely
 from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
-from seip_addon.core.arrays import Boolean, Float, Integer, Text
+from seip_addon.core.base.arrays import Boolean, Float, Integer, Text
 from seip_addon.core.sensing.scans.frame import Frame
 
 from .settings import CLASS_CATEGORIES

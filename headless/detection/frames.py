@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from seip_addon.core.arrays import Float, Integer
-from seip_addon.core.errors import SeipError
+from seip_addon.core.base.arrays import Float, Integer
+from seip_addon.core.base.errors import SeipError
 from seip_addon.core.sensing.scans.frame import Frame
 from seip_addon.core.sensing.scans.run_folder import frame_path, load_manifest
 from seip_addon.core.sensing.traffic.run_overlap import VehiclePositions, require_independent

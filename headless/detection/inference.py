@@ -8,7 +8,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from seip_addon.core.errors import SeipError
+from seip_addon.core.base.errors import SeipError
 from seip_addon.core.sensing.scans.frame import Frame
 
 from .detection_area import DetectionArea

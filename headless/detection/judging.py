@@ -9,10 +9,10 @@ from pathlib import Path
 
 import numpy as np
 
-from seip_addon.core.arrays import Float
+from seip_addon.core.base.arrays import Float
+from seip_addon.core.base.errors import SeipError
+from seip_addon.core.base.progress import Progress
 from seip_addon.core.choosing.placement.judgement import MEAN, Figure, JudgedFinalist, Judgement
-from seip_addon.core.errors import SeipError
-from seip_addon.core.progress import Progress
 from seip_addon.core.sensing.lidar.model import LidarModel
 from seip_addon.core.sensing.scans.simulation import ScanSettings
 from seip_addon.core.sensing.traffic.run_overlap import require_independent, vehicle_positions

@@ -17,7 +17,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from seip_addon.core.arrays import Boolean, Float, Integer
+from seip_addon.core.base.arrays import Boolean, Float, Integer
 
 from .frame_results import FrameResult
 from .rotated_boxes import in_plan, iou_matrix, iou_matrix_3d

@@ -14,8 +14,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from seip_addon.core.arrays import Boolean, Float, Integer
-from seip_addon.core.errors import SeipError
+from seip_addon.core.base.arrays import Boolean, Float, Integer
+from seip_addon.core.base.errors import SeipError
 
 from .settings import GRID_STRIDE
 

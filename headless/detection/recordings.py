@@ -10,11 +10,11 @@ from pathlib import Path
 
 import numpy as np
 
-from seip_addon.core.arrays import Boolean, Float
-from seip_addon.core.errors import SeipError
-from seip_addon.core.limits import FRAMES, TIME_STEP
+from seip_addon.core.base.arrays import Boolean, Float
+from seip_addon.core.base.errors import SeipError
+from seip_addon.core.base.limits import FRAMES, TIME_STEP
+from seip_addon.core.base.progress import finish
 from seip_addon.core.output.results.versions import versions
-from seip_addon.core.progress import finish
 from seip_addon.core.sensing.scans.frame import Frame
 from seip_addon.core.sensing.scans.run_folder import Run
 from seip_addon.core.sensing.scans.sensor import MountedSensor

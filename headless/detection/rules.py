@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from seip_addon.core.errors import SeipError
+from seip_addon.core.base.errors import SeipError
 from seip_addon.core.output.results.detection_record import Precision
 
 from .average_precision import average_precision_interval, evaluate

@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass
 
-from seip_addon.core.errors import SeipError
-from seip_addon.core.settings import setting
+from seip_addon.core.base.errors import SeipError
+from seip_addon.core.base.settings import setting
 
 CLASS_CATEGORIES = {
     "car": ("car", "van"),
@@ -63,7 +63,7 @@ class NetworkSettings:
     >>> NetworkSettings(pillar=5.0)
     Traceback (most recent call last):
     ...
-    seip_addon.core.errors.SeipError: detector: a pillar must be 0.05 to 2 m wide
+    seip_addon.core.base.errors.SeipError: detector: a pillar must be 0.05 to 2 m wide
     """
 
     pillar: float = 0.32

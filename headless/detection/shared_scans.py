@@ -3,7 +3,7 @@
 from collections.abc import Generator, Iterator, Mapping, Sequence
 from pathlib import Path
 
-from seip_addon.core.progress import Progress
+from seip_addon.core.base.progress import Progress
 from seip_addon.core.sensing.scans.frame import Frame
 from seip_addon.core.sensing.scans.scanner import Scanner
 from seip_addon.core.sensing.scans.sensor import MountedSensor

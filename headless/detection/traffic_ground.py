@@ -12,7 +12,7 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from seip_addon.core.arrays import Boolean, Float
+from seip_addon.core.base.arrays import Boolean, Float
 
 from .frame_results import EvaluatedBoxes, FrameResult
 

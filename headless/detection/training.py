@@ -21,8 +21,8 @@ import torch
 from torch import Tensor
 from torch.utils.data import DataLoader, Dataset
 
-from seip_addon.core.errors import SeipError
-from seip_addon.core.progress import Progress
+from seip_addon.core.base.errors import SeipError
+from seip_addon.core.base.progress import Progress
 from seip_addon.core.storage.source_digest import source_digest
 
 from .average_precision import evaluate

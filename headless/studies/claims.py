@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from headless.studies.markdown import table
 
-from seip_addon.core.estimates import Interval
+from seip_addon.core.base.estimates import Interval
 from seip_addon.core.storage.files import whole_file
 
 HOLDS, FAILS, UNDECIDED = "holds", "does not hold", "undecided"

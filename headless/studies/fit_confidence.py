@@ -22,7 +22,7 @@ from headless.detection_results import read_detections
 
 import numpy as np
 
-from seip_addon.core.arrays import Boolean, Float, Integer
+from seip_addon.core.base.arrays import Boolean, Float, Integer
 from seip_addon.core.sensing.recordings.box_labels import BoxLabels, read_labels
 from seip_addon.core.sensing.scans.frame import Frame
 from seip_addon.core.storage.files import natural_order, save_json

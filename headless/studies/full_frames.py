@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from seip_addon.core.arrays import Integer
+from seip_addon.core.base.arrays import Integer
 from seip_addon.core.geometry.orientation import rotations
 from seip_addon.core.sensing.lidar.noisy_returns import return_chance
 from seip_addon.core.sensing.scans.frame import STATIC_INSTANCE

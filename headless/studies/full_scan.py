@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from seip_addon.core.arrays import Boolean
+from seip_addon.core.base.arrays import Boolean
 from seip_addon.core.geometry.orientation import orientation as orientation_of
 from seip_addon.core.sensing.visibility.near_surfaces import NearSurfaces, rotated_surfaces
 from seip_addon.core.sensing.visibility.scanning import ScanPosition, seen_by_rays

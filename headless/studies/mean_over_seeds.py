@@ -5,8 +5,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from seip_addon.core.errors import SeipError
-from seip_addon.core.estimates import Interval, student_reach
+from seip_addon.core.base.errors import SeipError
+from seip_addon.core.base.estimates import Interval, student_reach
 
 ANYTHING: Interval = (-math.inf, math.inf)  # range of a figure without bounds
 COUNT: Interval = (0.0, math.inf)

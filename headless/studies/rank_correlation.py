@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from seip_addon.core.arrays import Float
+from seip_addon.core.base.arrays import Float
 
 
 def rank_agreements(x: Float, y: Float) -> tuple[Float, Float]:

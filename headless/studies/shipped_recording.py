@@ -16,7 +16,7 @@ import bpy
 import numpy as np
 import shapely
 
-from seip_addon.core.arrays import Float, Integer
+from seip_addon.core.base.arrays import Float, Integer
 from seip_addon.core.geometry.plan import surface_height
 from seip_addon.core.geometry.solids import prism
 from seip_addon.core.sensing.lidar.catalogue import load_catalogue

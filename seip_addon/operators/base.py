@@ -12,12 +12,12 @@ from typing import Any, TypeVar
 
 import bpy
 
-from .. import scene_status
-from ..background import Background
-from ..core.acceptance import Acceptance
-from ..core.errors import SeipError
-from ..core.progress import Progress, finish, progress_line, reporter
-from ..session import RunningWork, scene_of, session
+from ..core.base.acceptance import Acceptance
+from ..core.base.errors import SeipError
+from ..core.base.progress import Progress, finish, progress_line, reporter
+from ..state import scene_status
+from ..state.background import Background
+from ..state.session import RunningWork, scene_of, session
 
 Result = TypeVar("Result")
 Outcome = set[str]

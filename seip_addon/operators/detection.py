@@ -9,10 +9,10 @@ from tempfile import TemporaryDirectory
 
 import bpy
 
-from .. import preferences, scene_status
-from ..core.errors import SeipError
+from .. import preferences
+from ..core.base.errors import SeipError
+from ..core.base.progress import Progress
 from ..core.output.results.detection_record import MAIN_RULE, parsed_detection
-from ..core.progress import Progress
 from ..core.storage.files import check_folder, digest, unfinished_name
 from ..core.workflows.detection import INSTALL, DetectionJob, detect_elsewhere
 from ..core.workflows.traffic_runs import found_runs
@@ -20,6 +20,7 @@ from ..properties.conversion import absolute, runs_folder, saved_path
 from ..scene import contract
 from ..scene.blend_file import save_blend
 from ..scene.sensors import labelled_sensors, pose_of
+from ..state import scene_status
 from .base import Job, LongWork, started
 from .traffic import no_sensors
 

@@ -10,12 +10,12 @@ from pathlib import Path
 
 import bpy
 
-from .. import preferences, scene_status, scene_survey, selection
-from ..core.acceptance import Acceptance
+from .. import preferences
+from ..core.base.acceptance import Acceptance
+from ..core.base.errors import SeipError
+from ..core.base.progress import Progress, altered
 from ..core.choosing.placement.objective import Objective, check_objective
-from ..core.errors import SeipError
 from ..core.output.results.answer import answer
-from ..core.progress import Progress, altered
 from ..core.workflows.detection import DetectionJob
 from ..core.workflows.early_answer import after_early_answer, early_answer
 from ..core.workflows.finalists import check_judged, find_finalists, judge_elsewhere, judged_solution
@@ -25,8 +25,10 @@ from ..core.workflows.traffic_runs import TrafficRuns, found_runs, read_runs
 from ..properties.conversion import runs_folder, saved_path
 from ..properties.placement import RULE_ITEMS
 from ..scene.write import write_result
-from ..session import SceneState, scene_of, session
+from ..state import scene_status, selection
+from ..state.session import SceneState, scene_of, session
 from ..viewport import coverage, overlays, search
+from . import scene_survey
 from .base import ForReadyScene, Job, LongWork, ShortWork, started
 from .detection import NO_PYTHON, no_python, saved_scene
 from .results import keep_result

@@ -16,16 +16,16 @@ from tempfile import TemporaryDirectory
 import bpy
 from mathutils import Vector
 
-from .. import live_coverage, preferences, scene_status, scene_survey
+from .. import preferences
+from ..core.base.errors import SeipError
+from ..core.base.progress import Progress
 from ..core.choosing.placement.objective import Objective
-from ..core.errors import SeipError
 from ..core.output.pictures.colours import compare, packed_counts, unpacked_counts
 from ..core.output.report.sections import write_report
 from ..core.output.results.answer import answer, change_text, sentence
 from ..core.output.results.file_names import REPORT_FILES
 from ..core.output.results.placement_record import PlacementRecord, Provenance, load_placement, parsed_record
 from ..core.output.results.versions import versions
-from ..core.progress import Progress
 from ..core.sensing.scans.sensor import MountedSensor
 from ..core.sensing.visibility.visibility_model import VisibilityModel, visibility_model
 from ..core.storage.files import check_folder, digest
@@ -42,8 +42,10 @@ from ..scene.render_elsewhere import render_elsewhere
 from ..scene.result_folder import result_files, write_pictures, write_tables
 from ..scene.sensors import labelled_sensors, placed_sensors, read_sensors
 from ..scene.write import coverage_of, shown_legend, take_over
-from ..sensor_edits import position_names, sensor_edits
-from ..session import SceneState, session
+from ..state import live_coverage, scene_status
+from ..state.sensor_edits import position_names, sensor_edits
+from ..state.session import SceneState, session
+from . import scene_survey
 from .base import ForReadyScene, Job, LongWork, Obstacles, Outcome, ShortWork, started
 
 OTHER_TARGETS = "The two placements were made on different targets: only their figures can be compared."

@@ -7,11 +7,12 @@ from pathlib import Path
 import bpy
 from bl_operators.presets import AddPresetBase
 
-from .. import preferences, sensor_types
-from ..core.counts import counted
-from ..core.errors import SeipError
+from .. import preferences
+from ..core.base.counts import counted
+from ..core.base.errors import SeipError
 from ..core.sensing.lidar.catalogue import load_catalogue
-from ..session import session
+from ..state import sensor_types
+from ..state.session import session
 from ..viewport import beam_preview, overlays
 from .base import Outcome, ShortWork
 

@@ -7,16 +7,16 @@ from pathlib import Path
 
 import bpy
 
-from .. import preferences, scene_status, selection, sensor_types
-from ..core.counts import counted
-from ..core.errors import SeipError
+from .. import preferences
+from ..core.base.counts import counted
+from ..core.base.errors import SeipError
+from ..core.base.progress import Progress, finish
 from ..core.output.results.placement_record import relevant_warnings
-from ..core.progress import Progress, finish
+from ..core.programs.sumo_programs import NETWORK_SUFFIX
 from ..core.site.check import Problem, SceneContents, SiteCheck, check_site
 from ..core.site.roles import Role
 from ..core.site.scene_geometry import SceneGeometry
 from ..core.site.site import Site
-from ..core.sumo_programs import NETWORK_SUFFIX
 from ..core.workflows.site_building import BuiltSite, SiteRequest, build_site, site_source
 from ..core.workflows.site_places import SitePlaces, site_places
 from ..core.workflows.survey import lay_out
@@ -32,7 +32,8 @@ from ..scene.changes import watch
 from ..scene.check import contents_of
 from ..scene.startup import remove_startup_objects
 from ..scene.views import frame_site
-from ..session import CheckedScene, session
+from ..state import scene_status, selection, sensor_types
+from ..state.session import CheckedScene, session
 from ..viewport import overlays
 from .base import Conditional, Job, LongWork, Obstacles, Outcome, ShortWork
 

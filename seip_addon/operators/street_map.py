@@ -6,7 +6,7 @@ from typing import Any
 
 import bpy
 
-from ..session import session
+from ..state.session import session
 from ..viewport.free_frame import free_frame
 from ..viewport.overlays import viewports
 from ..viewport.street_map import BETWEEN, HELP, StreetMap

@@ -9,15 +9,15 @@ from typing import Any
 
 import bpy
 
-from .. import last_scan, preferences, scene_status
-from ..core.counts import counted
-from ..core.errors import SeipError
+from .. import preferences
+from ..core.base.counts import counted
+from ..core.base.errors import SeipError
+from ..core.base.progress import Progress, finish
 from ..core.output.results.versions import versions
-from ..core.progress import Progress, finish
+from ..core.programs.sumo_installation import install_sumo
 from ..core.sensing.scans.run_folder import Record, Run, check_run_folder
 from ..core.sensing.traffic.source import describe_categories, load_traffic
 from ..core.sensing.traffic.trajectories import Trajectories
-from ..core.sumo_installation import install_sumo
 from ..core.workflows.recording import RecordingSettings, make_run, record, simulation_of
 from ..core.workflows.traffic_simulation import SimulatedRuns, simulate_runs
 from ..properties.conversion import saved_path
@@ -25,7 +25,9 @@ from ..scene import contract
 from ..scene.read import read_scene
 from ..scene.sensors import labelled_sensors, read_sensors
 from ..scene.traffic import animate, clear_traffic, read_traffic
-from ..session import LastScan, session
+from ..state import scene_status
+from ..state.session import LastScan, session
+from ..viewport import last_scan
 from .base import Job, LongWork, Outcome, ShortWork
 
 NO_FILE = "There is no traffic file: name one, or animate objects of your own in SEIP Traffic."

@@ -9,12 +9,12 @@ from tempfile import TemporaryDirectory
 
 import bpy
 
-from .. import live_coverage, preferences, scene_status
-from ..core.errors import SeipError
+from .. import preferences
+from ..core.base.errors import SeipError
+from ..core.base.progress import Progress
 from ..core.output.results.file_names import VERIFICATION_FOLDER, VERIFICATION_PICTURES
 from ..core.output.results.verification_record import summary
 from ..core.output.results.versions import versions
-from ..core.progress import Progress
 from ..core.sensing.recordings.recording import Recording, open_recording
 from ..core.sensing.recordings.verification import Verification
 from ..core.sensing.scans.sensor import MountedSensor
@@ -28,7 +28,8 @@ from ..scene.changes import watch
 from ..scene.corrections import correct_scene
 from ..scene.read import read_scene
 from ..scene.sensors import read_sensors
-from ..session import LastVerification, session
+from ..state import live_coverage, scene_status
+from ..state.session import LastVerification, session
 from .base import Job, LongWork, ShortWork
 from .detection import folder_of_result
 from .results import no_folder

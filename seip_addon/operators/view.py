@@ -10,19 +10,19 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import last_scan, scene_survey
-from ..core.errors import SeipError
+from ..core.base.errors import SeipError
 from ..core.sensing.visibility.sight_lines import pose_at, sight_lines
 from ..properties.conversion import saved_path
 from ..scene import contract
 from ..scene.coverage_colours import colour_coverage
 from ..scene.sensors import pose_of
 from ..scene.write import coverage_of
-from ..session import SceneState, session
-from ..viewport import coverage, overlays
+from ..state.session import SceneState, session
+from ..viewport import coverage, last_scan, overlays
 from ..viewport.picture import view_pixels
 from ..viewport.sight_lines import NAME as SIGHT
 from ..viewport.sight_lines import sight_overlay
+from . import scene_survey
 from .base import Job, LongWork, Outcome, ShortWork
 from .results import ForPlacement, active_sensor, not_evaluated
 

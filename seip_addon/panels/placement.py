@@ -6,11 +6,10 @@ from functools import partial
 
 import bpy
 
-from .. import scene_status
+from ..core.base.counts import counted, duration_text
 from ..core.choosing.placement.objective import certificate, purpose
 from ..core.choosing.placement.returns_summary import returns_text
 from ..core.choosing.placement.scenarios import DEFAULT_COUNTS
-from ..core.counts import counted, duration_text
 from ..core.output.results.answer import answer, sentence, status_text
 from ..core.output.results.placement_record import PlacementRecord, parsed_record, relevant_warnings
 from ..core.site.obstruction import NO_OBSTACLES_MESSAGE
@@ -18,8 +17,9 @@ from ..operators.detection import no_python
 from ..operators.results import no_placement
 from ..operators.sensors import SEIP_MT_survey_presets
 from ..scene.sensors import labelled_sensors
-from ..sensor_edits import sensor_edits
-from ..session import session
+from ..state import scene_status
+from ..state.sensor_edits import sensor_edits
+from ..state.session import session
 from .sections import BETWEEN, Status, draw_sections
 from .sidebar import RowList, draw_path, draw_reason, draw_run, draw_runs, draw_settings, is_narrow, settings_column
 from .wrapped_text import BOX, draw_lines, draw_sentence, sidebar_width

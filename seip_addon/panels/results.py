@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import bpy
 
-from .. import last_scan
 from ..core.choosing.placement.returns_summary import SURFACE_SEEN, returns_text
 from ..core.output.results.placement_record import PlacementRecord, parsed_record
 from ..core.sensing.lidar.model import short_name
@@ -13,9 +12,9 @@ from ..operators.results import no_placement
 from ..operators.view import ASPECTS, why_no_coverage
 from ..properties.conversion import complaint
 from ..scene.write import ASPECT, aspects_of, coverage_of
-from ..sensor_edits import sensor_edits
-from ..session import FollowedSensors, session
-from ..viewport import coverage, overlays
+from ..state.sensor_edits import sensor_edits
+from ..state.session import FollowedSensors, session
+from ..viewport import coverage, last_scan, overlays
 from ..viewport.sight_lines import NAME as SIGHT
 from . import placement
 from .sections import Status, draw_sections

@@ -7,7 +7,7 @@ from typing import NamedTuple, TypeVar
 
 import bpy
 
-from ..session import session
+from ..state.session import session
 from .wrapped_text import MARGIN, text_width
 
 UNIT = 20.0

@@ -6,7 +6,6 @@ import math
 
 import bpy
 
-from .. import sensor_types
 from ..core.output.results.placement_record import parsed_record
 from ..core.sensing.lidar.model import LidarModel
 from ..core.sensing.returns.bodies import PANELS
@@ -16,7 +15,8 @@ from ..core.sensing.visibility.settings import VisibilitySettings
 from ..operators.base import Outcome
 from ..operators.results import no_placement
 from ..scene.materials import REFLECTIVITY
-from ..session import session
+from ..state import sensor_types
+from ..state.session import session
 from ..viewport import beam_preview, overlays
 from .sections import Status, draw_sections
 from .sidebar import is_narrow, settings_column

@@ -6,11 +6,11 @@ from pathlib import Path
 
 import bpy
 
-from .. import scene_status
-from ..core.progress import progress_line
+from ..core.base.progress import progress_line
 from ..core.workflows.traffic_runs import traffic_folder
 from ..operators.base import is_searching
-from ..session import session
+from ..state import scene_status
+from ..state.session import session
 from ..viewport.overlays import TAB
 from .wrapped_text import MARGIN, draw_sentence, sidebar_width, text_width
 

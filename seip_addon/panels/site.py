@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import bpy
 
-from .. import preferences, scene_status
+from .. import preferences
 from ..core.output.results.answer import sentence
 from ..core.site.roles import Role
 from ..operators.base import Outcome
 from ..operators.site import SEIP_OT_build_site, in_short, is_of_choice, missing_for_build
 from ..properties.site import SEIP_PG_site
 from ..scene import roles
-from ..session import session
+from ..state import scene_status
+from ..state.session import session
 from . import sumo
 from .sections import Status, draw_sections
 from .sidebar import draw_path, draw_reason, draw_run, draw_settings, settings_column

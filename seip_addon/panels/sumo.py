@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 
 from .. import preferences
-from ..core.sumo_installation import sumo_size
+from ..core.programs.sumo_installation import sumo_size
 from ..operators.traffic import SEIP_OT_install_sumo
 from .sidebar import draw_run
 from .wrapped_text import draw_sentence

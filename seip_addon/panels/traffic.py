@@ -7,7 +7,7 @@ from pathlib import Path
 import bpy
 
 from .. import preferences
-from ..core.errors import SeipError
+from ..core.base.errors import SeipError
 from ..core.output.results.detection_record import MAIN_RULE, DetectionRecord, parsed_detection
 from ..core.workflows.detection import ERRORS
 from ..operators.detection import NO_PYTHON, sensors_key, why_no_detection
@@ -15,7 +15,7 @@ from ..operators.traffic import why_no_load, why_no_scan, why_no_simulation
 from ..operators.verification import CHANGED as VERIFY_AGAIN
 from ..operators.verification import NO_RECORDING, picture_of, sentences_of, why_no_correction, why_no_verification
 from ..properties.conversion import absolute
-from ..session import session
+from ..state.session import session
 from . import sumo
 from .sections import Status, draw_sections
 from .sidebar import draw_path, draw_reason, draw_run, draw_runs, draw_settings

@@ -12,8 +12,8 @@ from typing import Any
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
-from ..core.errors import SeipError
-from ..core.settings import settings_of
+from ..core.base.errors import SeipError
+from ..core.base.settings import settings_of
 from ..core.workflows.traffic_runs import traffic_folder
 
 _KINDS = {bool: BoolProperty, int: IntProperty, float: FloatProperty, str: EnumProperty}

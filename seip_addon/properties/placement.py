@@ -7,10 +7,10 @@ from typing import Literal
 import bpy
 from bpy.props import CollectionProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
-from .. import selection
 from ..core.choosing.placement.objective import DEFAULT_COUNT, Objective
 from ..core.choosing.placement.scenarios import Scenarios
 from ..core.sensing.scenarios.pose_errors import MAX_ANGLE_STD, PoseErrors
+from ..state import selection
 from .conversion import as_typed, of_setting
 
 RULE_ITEMS = (("MANDATORY", "Sensor", "There must be a sensor"), ("FORBIDDEN", "No sensor", "There must be none"))

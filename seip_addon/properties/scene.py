@@ -5,12 +5,12 @@ from __future__ import annotations
 import bpy
 from bpy.props import BoolProperty, CollectionProperty, EnumProperty, IntProperty, PointerProperty, StringProperty
 
-from .. import last_scan, selection
-from ..core.errors import SeipError
+from ..core.base.errors import SeipError
 from ..core.output.results.placement_record import parsed_record
 from ..scene import contract
-from ..scene_status import FILE_VERSION
-from ..viewport import coverage
+from ..state import selection
+from ..state.scene_status import FILE_VERSION
+from ..viewport import coverage, last_scan
 from .conversion import path_property
 from .placement import SEIP_PG_goal
 from .site import SEIP_PG_site

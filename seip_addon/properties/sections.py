@@ -11,7 +11,7 @@ from typing import Any
 import bpy
 from bpy.props import BoolProperty, IntProperty, PointerProperty
 
-from .. import scene_status
+from ..state import scene_status
 
 AUTOMATIC, CLOSED, OPEN = -1, 0, 1
 """States of a step: open while it is the current one, or as the user left it."""

@@ -9,9 +9,9 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, St
 
 from ..core.output.datasets.formats import FORMATS
 from ..core.output.datasets.sample import SPLITS
+from ..core.programs.sumo_programs import NETWORK_SUFFIX
 from ..core.sensing.scans.simulation import ScanSettings
 from ..core.sensing.traffic.source import TrafficFiles
-from ..core.sumo_programs import NETWORK_SUFFIX
 from ..core.workflows.recording import RecordingSettings
 from ..core.workflows.traffic_simulation import DEFAULT_RUNS, SimulationSettings
 from ..core.world.openstreetmap.site import is_extract

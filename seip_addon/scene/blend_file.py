@@ -9,7 +9,7 @@ from pathlib import Path
 
 import bpy
 
-from ..core.errors import SeipError
+from ..core.base.errors import SeipError
 from ..core.storage.files import whole_file
 from .interrupts import held_signals
 from .views import set_up_view

@@ -9,7 +9,7 @@ import bpy
 import numpy as np
 import shapely
 
-from ..core.progress import Progress
+from ..core.base.progress import Progress
 from ..core.site.roles import AREA_OVERLAYS, Role
 from ..core.storage.files import digest
 from ..core.world.streetscape.model import SiteModel

@@ -16,7 +16,7 @@ from weakref import WeakSet
 import bpy
 from numpy.typing import NDArray
 
-from ..core.errors import SeipError
+from ..core.base.errors import SeipError
 from ..core.storage.files import digest
 from . import contract
 from .read import shown_parts

@@ -7,9 +7,9 @@ from collections.abc import Iterable, Iterator
 import bpy
 import numpy as np
 
-from ..core.arrays import Float
-from ..core.counts import counted
-from ..core.errors import SeipError
+from ..core.base.arrays import Float
+from ..core.base.counts import counted
+from ..core.base.errors import SeipError
 from ..core.site.check import Problem, SceneContents, Surface
 from ..core.site.roles import Role
 from ..core.site.scene_geometry import SceneGeometry

@@ -9,7 +9,7 @@ import numpy as np
 from mathutils import Matrix
 from mathutils.kdtree import KDTree
 
-from ..core.arrays import Boolean, Float
+from ..core.base.arrays import Boolean, Float
 from ..core.sensing.recordings.comparison import Change
 from ..core.sensing.recordings.verification import Verification
 from ..core.sensing.scans.sensor import MountedSensor

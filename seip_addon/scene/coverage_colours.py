@@ -5,8 +5,8 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
-from ..core.arrays import Float, Integer
-from ..core.errors import SeipError
+from ..core.base.arrays import Float, Integer
+from ..core.base.errors import SeipError
 from ..core.output.pictures.colours import Aspect, Colouring, as_placed, colouring
 from .write import ASPECT, RETURNS, SEEN_BY, TARGET_WEIGHT, aspects_of, coverage_of, paint
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
-from ..core.errors import SeipError
+from ..core.base.errors import SeipError
 from ..core.output.pictures.palette import (
     FORBIDDEN_VEIL,
     INK,

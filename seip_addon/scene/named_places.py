@@ -8,7 +8,7 @@ from collections.abc import Iterable
 import bpy
 import shapely
 
-from ..core.errors import SeipError
+from ..core.base.errors import SeipError
 from ..core.site.scene_geometry import NamedArea
 from . import contract
 

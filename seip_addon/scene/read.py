@@ -13,12 +13,12 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from ..core.arrays import Boolean, Float, Integer
-from ..core.counts import counted
-from ..core.errors import SeipError
+from ..core.base.arrays import Boolean, Float, Integer
+from ..core.base.counts import counted
+from ..core.base.errors import SeipError
+from ..core.base.limits import LOCAL_COORDINATE, MAP_COORDINATE, WEIGHT
 from ..core.geometry.geo_reference import GeoReference
 from ..core.geometry.plan import outline
-from ..core.limits import LOCAL_COORDINATE, MAP_COORDINATE, WEIGHT
 from ..core.site.post_rules import RULES, KeepOffArea, RuleName
 from ..core.site.scene_geometry import DEFAULT_WEIGHT, Mesh, NamedArea, Pole, SceneGeometry, joined
 from . import contract

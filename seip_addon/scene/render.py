@@ -17,9 +17,9 @@ import numpy as np
 from mathutils import Matrix, Vector
 from PIL import Image
 
-from ..core.arrays import Boolean, Float
+from ..core.base.arrays import Boolean, Float
+from ..core.base.errors import SeipError
 from ..core.choosing.placement.deployment import Deployment
-from ..core.errors import SeipError
 from ..core.output.pictures.viewpoint import MOST, TILE, Sight, Viewpoint, frame, viewpoints
 from ..core.site.site import Site
 from . import contract

@@ -12,10 +12,10 @@ from pathlib import Path
 
 import bpy
 
-from ..core.child_process import run_logged
+from ..core.base.errors import SeipError
+from ..core.base.progress import Progress
 from ..core.choosing.placement.deployment import Deployment
-from ..core.errors import SeipError
-from ..core.progress import Progress
+from ..core.programs.child_process import run_logged
 from ..core.site.site import Site
 from .render import RenderedPictures, Taken, labelled_pictures, raw_files, sample_count, shots_of
 

@@ -10,9 +10,10 @@ from tempfile import TemporaryDirectory
 import bpy
 from PIL import Image
 
+from ..core.base.errors import SeipError
+from ..core.base.progress import Progress
 from ..core.choosing.placement.deployment import Deployment
 from ..core.choosing.placement.objective import Solution, placement_constraints
-from ..core.errors import SeipError
 from ..core.output.pictures.close_ups import draw_plans, save_close_ups
 from ..core.output.pictures.colours import Legend, packed_counts
 from ..core.output.pictures.labelled_view import save_labelled_view
@@ -23,7 +24,6 @@ from ..core.output.results.file_names import REPORT_FILES
 from ..core.output.results.geographic_files import LOCATED_FILES, located, save_geojson, save_kml
 from ..core.output.results.placement_record import PlacementRecord, save_placement
 from ..core.output.results.site_file import save_site_file
-from ..core.progress import Progress
 from ..core.site.site import Site
 from ..core.storage.files import digest, unfinished_name
 from ..core.workflows.survey import Survey

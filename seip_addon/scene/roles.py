@@ -8,7 +8,7 @@ from collections.abc import Iterable
 import bpy
 import numpy as np
 
-from ..core.errors import SeipError
+from ..core.base.errors import SeipError
 from ..core.site.roles import AREA_OVERLAYS, Role
 from . import contract
 from .build import COLLECTIONS

@@ -11,8 +11,8 @@ from collections.abc import Mapping, Sequence
 import bpy
 import numpy as np
 
-from ..core.arrays import Float
-from ..core.errors import SeipError
+from ..core.base.arrays import Float
+from ..core.base.errors import SeipError
 from ..core.sensing.lidar.catalogue import find_models
 from ..core.sensing.lidar.model import LidarModel
 from ..core.sensing.scans.sensor import MountedSensor

@@ -10,10 +10,10 @@ from dataclasses import dataclass, field
 import bpy
 import numpy as np
 
-from ..core.arrays import Float
-from ..core.errors import SeipError
+from ..core.base.arrays import Float
+from ..core.base.errors import SeipError
+from ..core.base.progress import Progress
 from ..core.geometry.solids import Solid
-from ..core.progress import Progress
 from ..core.sensing.traffic.bodies import Body, colour_of, fitted_body
 from ..core.sensing.traffic.trajectories import CATEGORIES, MAX_BEND, RoadUser, Trajectories, is_shape
 from . import contract

@@ -7,14 +7,14 @@ from functools import lru_cache
 import bpy
 import numpy as np
 
-from ..core.arrays import Float
+from ..core.base.arrays import Float
 from ..core.output.pictures.palette import DENSE_BEAMS, PAPER, WIDE_BEAMS, rgb
 from ..core.sensing.lidar.model import LidarModel
 from ..core.sensing.lidar.rings import BeamRings, beam_rings
 from ..core.sensing.visibility.ring_resolution import unresolved_from
-from ..overlay import Block, Entry, Layer, Overlay
 from ..scene import contract
-from ..session import session
+from ..state.overlay import Block, Entry, Layer, Overlay
+from ..state.session import session
 
 NAME = "beams"
 DENSE, WIDE, CONE = (*rgb(DENSE_BEAMS), 0.9), (*rgb(WIDE_BEAMS), 0.9), (*rgb(PAPER), 0.35)

@@ -5,9 +5,9 @@ from collections.abc import Iterator
 import bpy
 
 from ..core.output.pictures.palette import FORBIDDEN_VEIL, MANDATORY_VEIL, WEIGHTED_VEIL, rgb
-from ..overlay import Block, Entry, Overlay
 from ..scene import contract
 from ..scene.write import coverage_of, shown_legend
+from ..state.overlay import Block, Entry, Overlay
 from . import overlays
 from .labels import labels_of_sensors
 

@@ -5,12 +5,12 @@ import bpy
 import numpy as np
 from mathutils import Matrix, Vector
 
-from ..core.arrays import Float
+from ..core.base.arrays import Float
 from ..core.output.pictures.labels import stack_upwards
-from ..overlay import Label
 from ..scene import contract
 from ..scene.sensors import placed_sensors
-from ..session import session
+from ..state.overlay import Label
+from ..state.session import session
 from .free_frame import Box
 from .legend import FONT, PAPER, TEXT_SIZE, fill, write
 

@@ -7,7 +7,7 @@ import blf
 import gpu
 from gpu_extras.batch import batch_for_shader
 
-from ..overlay import Block, Colour, Entry
+from ..state.overlay import Block, Colour, Entry
 from .free_frame import Box
 
 TEXT_SIZE, LINE, SWATCH, GAP, MARGIN = 12.0, 20.0, 22.0, 8.0, 14.0  # pixels at the interface's usual scale

@@ -11,8 +11,8 @@ import bpy
 import gpu
 from mathutils import Matrix
 
-from ..overlay import Block, Label, Overlay
-from ..session import session
+from ..state.overlay import Block, Label, Overlay
+from ..state.session import session
 from .free_frame import Box, free_frame, navigation_boxes
 from .labels import draw_labels
 from .legend import draw_legend, placed_legend

@@ -3,10 +3,10 @@
 import bpy
 import numpy as np
 
+from ..core.base.progress import Progress
 from ..core.output.pictures.palette import SENSOR_BODY, rgb
-from ..core.progress import Progress
 from ..core.workflows.survey import Layout
-from ..overlay import Block, Colour, Entry, Label, Layer, Overlay
+from ..state.overlay import Block, Colour, Entry, Label, Layer, Overlay
 
 NAME = "search"
 COLOUR: Colour = (*rgb(SENSOR_BODY), 1.0)

@@ -3,11 +3,11 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.arrays import Float
+from ..core.base.arrays import Float
 from ..core.output.pictures.palette import HIDDEN_COLOUR, MISSED_COLOUR, SIGHT_LINE, rgb
 from ..core.sensing.visibility.sight_lines import SightLines
-from ..overlay import Block, Colour, Entry, Layer, Overlay
 from ..scene.write import LIFT
+from ..state.overlay import Block, Colour, Entry, Layer, Overlay
 
 NAME = "sight lines"
 LINES: Colour = (*rgb(SIGHT_LINE), 0.30)

@@ -10,7 +10,7 @@ import gpu
 import numpy as np
 from gpu_extras.batch import batch_for_shader
 
-from ..core.arrays import Float, Integer
+from ..core.base.arrays import Float, Integer
 from ..core.geometry.map_view import MapView, under_mouse
 from ..core.output.pictures.labels import StreetLabel, start_of, street_labels
 from ..core.output.pictures.palette import MAP_GROUND, MAP_JUNCTION, MAP_STREETS, rgb

@@ -6,7 +6,8 @@ import bpy
 import pytest
 
 import seip_addon
-from seip_addon import preferences, sensor_types
+from seip_addon import preferences
+from seip_addon.state import sensor_types
 
 
 @pytest.fixture

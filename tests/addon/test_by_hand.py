@@ -11,7 +11,6 @@ import bpy
 import numpy as np
 import pytest
 
-from seip_addon import live_coverage, scene_status
 from seip_addon.core.choosing.placement.objective import MOVED, MOVED_MESSAGE, Objective
 from seip_addon.core.output.pictures.colours import unpacked_counts
 from seip_addon.core.output.results.answer import status_text
@@ -21,8 +20,9 @@ from seip_addon.scene import result_folder
 from seip_addon.scene.blend_file import save_blend
 from seip_addon.scene.result_folder import FILES
 from seip_addon.scene.sensors import placed_sensors
-from seip_addon.sensor_edits import sensor_edits
-from seip_addon.session import session
+from seip_addon.state import live_coverage, scene_status
+from seip_addon.state.sensor_edits import sensor_edits
+from seip_addon.state.session import session
 from tests.builders.drawn_layout import DrawnLayout
 from tests.oracles.json_schema import violations
 

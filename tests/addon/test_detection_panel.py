@@ -13,11 +13,11 @@ import bpy
 import pytest
 
 from seip_addon import preferences
-from seip_addon.background import Background
 from seip_addon.core.workflows.detection import DetectingPython
 from seip_addon.operators.detection import SEIP_OT_detect
 from seip_addon.panels import traffic as traffic_panel
 from seip_addon.scene.write import write_result
+from seip_addon.state.background import Background
 from tests.builders.small_junction import make_example
 
 PRECISION = {

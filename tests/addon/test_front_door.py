@@ -11,7 +11,6 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from seip_addon import loose_pieces, scene_status
 from seip_addon.operators.base import LongWork
 from seip_addon.panels import export, front_door, results, sections, sidebar, traffic, wrapped_text
 from seip_addon.scene import contract
@@ -19,6 +18,7 @@ from seip_addon.scene.read import read_scene
 from seip_addon.scene.sensors import placed_sensors
 from seip_addon.scene.views import CLIP_END
 from seip_addon.scene.write import write_result
+from seip_addon.state import loose_pieces, scene_status
 from tests.builders.drawn_layout import DrawnLayout
 from tests.builders.osm_text import crossing
 from tests.builders.scene_by_hand import make_scene

@@ -12,16 +12,16 @@ import bpy
 import numpy as np
 import pytest
 
-from seip_addon import scene_status, sensor_types
+from seip_addon.core.base.progress import Progress, finish
 from seip_addon.core.choosing.placement.scenarios import DEFAULT_COUNTS
 from seip_addon.core.output.results.placement_record import comparable, load_placement, parsed_record
-from seip_addon.core.progress import Progress, finish
 from seip_addon.core.sensing.visibility.grid import VisibilityGrid
 from seip_addon.core.sensing.visibility.ray_casting import BvhRayCaster, EmbreeRayCaster
 from seip_addon.panels import export as export_panel
 from seip_addon.panels import placement as placement_panel
 from seip_addon.scene.sensors import placed_sensors
-from seip_addon.session import session
+from seip_addon.state import scene_status, sensor_types
+from seip_addon.state.session import session
 from seip_addon.viewport.search import search_overlay
 from tests.builders.drawn_layout import DrawnLayout
 

@@ -4,14 +4,14 @@ import bpy
 import numpy as np
 import pytest
 
-from seip_addon import live_coverage
 from seip_addon.core.choosing.placement.returns_summary import returns_text
 from seip_addon.core.output.pictures.colours import unpacked_counts
 from seip_addon.core.output.results.placement_record import parsed_record
 from seip_addon.panels import results as results_panel
 from seip_addon.scene.sensors import placed_sensors
-from seip_addon.sensor_edits import sensor_edits
-from seip_addon.session import session
+from seip_addon.state import live_coverage
+from seip_addon.state.sensor_edits import sensor_edits
+from seip_addon.state.session import session
 from seip_addon.viewport.coverage import legend_of_coverage
 from tests.builders.drawn_layout import DrawnLayout
 

@@ -5,9 +5,10 @@ from pathlib import Path
 import bpy
 import pytest
 
-from seip_addon import live_coverage, scene_status, scene_survey
+from seip_addon.operators import scene_survey
 from seip_addon.panels import site
-from seip_addon.session import SceneState, session
+from seip_addon.state import live_coverage, scene_status
+from seip_addon.state.session import SceneState, session
 
 
 @pytest.fixture

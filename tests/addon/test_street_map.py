@@ -6,9 +6,9 @@ from types import SimpleNamespace
 import bpy
 import pytest
 
-from seip_addon.core.progress import finish
+from seip_addon.core.base.progress import finish
 from seip_addon.core.workflows.site_places import site_places
-from seip_addon.session import session
+from seip_addon.state.session import session
 from seip_addon.viewport.street_map import StreetMap
 from tests.builders.osm_text import Extract, crossing
 

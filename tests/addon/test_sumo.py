@@ -7,8 +7,8 @@ import bpy
 import pytest
 
 from seip_addon import preferences
-from seip_addon.core import sumo_programs
-from seip_addon.core.sumo_installation import SUMO_VERSION, sumo_size
+from seip_addon.core.programs import sumo_programs
+from seip_addon.core.programs.sumo_installation import SUMO_VERSION, sumo_size
 from seip_addon.panels import site, sumo
 from tests.builders.drawn_layout import DrawnLayout
 from tests.builders.osm_text import crossing

@@ -19,7 +19,7 @@ from seip_addon.panels import traffic as panel
 from seip_addon.scene import contract
 from seip_addon.scene.read import read_scene
 from seip_addon.scene.sensors import read_sensors
-from seip_addon.session import session
+from seip_addon.state.session import session
 from tests.builders.drawn_layout import DrawnLayout
 from tests.builders.site_recording import changed, save_site_recording
 from tests.builders.small_junction import box_triangles

@@ -10,7 +10,7 @@ from seip_addon.core.output.pictures.labelled_view import GAP
 from seip_addon.core.output.pictures.plan_view import DPI, MAP_WIDTH, MARGIN
 from seip_addon.operators import view
 from seip_addon.scene.sensors import placed_sensors
-from seip_addon.session import session
+from seip_addon.state.session import session
 from seip_addon.viewport import overlays
 from seip_addon.viewport.coverage import legend_of_coverage
 from seip_addon.viewport.sight_lines import NAME as SIGHT

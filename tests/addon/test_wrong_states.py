@@ -8,17 +8,17 @@ import bpy
 import pytest
 
 from seip_addon import preferences, registration
-from seip_addon.background import Background
-from seip_addon.core.acceptance import Acceptance
+from seip_addon.core.base.acceptance import Acceptance
+from seip_addon.core.base.progress import Progress
 from seip_addon.core.choosing.placement.search_limits import SolverLimits
 from seip_addon.core.output.results.answer import sentence
 from seip_addon.core.output.results.placement_record import parsed_record
-from seip_addon.core.progress import Progress
 from seip_addon.operators import base, results
 from seip_addon.panels import missing_package
 from seip_addon.panels import placement as placement_panel
 from seip_addon.panels.sidebar import draw_run
-from seip_addon.session import RunningWork, session
+from seip_addon.state.background import Background
+from seip_addon.state.session import RunningWork, session
 from tests.builders.drawn_layout import DrawnLayout
 
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from seip_addon.core.progress import finish
+from seip_addon.core.base.progress import finish
 from seip_addon.core.sensing.lidar.catalogue import load_catalogue
 from seip_addon.core.sensing.scans.scanner import ReflectiveSurface
 from seip_addon.core.sensing.scans.sensor import MountedSensor

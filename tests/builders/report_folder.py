@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import shapely
 
+from seip_addon.core.base.progress import finish
 from seip_addon.core.choosing.placement.concave import relative_gap
 from seip_addon.core.choosing.placement.deployment import deploy
 from seip_addon.core.choosing.placement.objective import (
@@ -26,7 +27,6 @@ from seip_addon.core.output.pictures.close_ups import draw_plans, save_close_ups
 from seip_addon.core.output.pictures.plan_view import save_plan_view
 from seip_addon.core.output.results.placement_record import Provenance, placement_record, save_placement
 from seip_addon.core.output.results.site_file import save_site_file
-from seip_addon.core.progress import finish
 from seip_addon.core.sensing.visibility.grid import VisibilityGrid
 from seip_addon.core.site.locations import locations
 from seip_addon.core.site.scene_geometry import NamedArea

@@ -5,10 +5,10 @@ from pathlib import Path
 
 import numpy as np
 
+from seip_addon.core.base.progress import finish
 from seip_addon.core.output.datasets.dataset_folder import write_dataset
 from seip_addon.core.output.datasets.formats import FORMATS
 from seip_addon.core.output.datasets.sample import TrafficRun
-from seip_addon.core.progress import finish
 from seip_addon.core.sensing.lidar.catalogue import load_catalogue
 from seip_addon.core.sensing.scans.frame import STATIC_INSTANCE, Frame, Labels
 from seip_addon.core.sensing.scans.sensor import MountedSensor

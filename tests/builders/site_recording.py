@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
+from seip_addon.core.base.progress import finish
 from seip_addon.core.output.datasets.formats import POINT_TYPE, encode
-from seip_addon.core.progress import finish
 from seip_addon.core.sensing.scans.sensor import MountedSensor
 from seip_addon.core.sensing.scans.simulation import ScanSettings, prepare
 from seip_addon.core.sensing.scans.static_scene import static_scene

@@ -4,7 +4,7 @@ import stat
 import zipfile
 from pathlib import Path
 
-from seip_addon.core.sumo_installation import SUMO_VERSION
+from seip_addon.core.programs.sumo_installation import SUMO_VERSION
 
 
 def write_programs(home: Path, version: str = SUMO_VERSION, script: str = "") -> None:

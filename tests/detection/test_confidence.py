@@ -16,7 +16,7 @@ from headless.detection.frame_results import EvaluatedBoxes, FrameResult
 from headless.detection.settings import CLASS_CATEGORIES, CLASSES
 from headless.studies.fit_confidence import calibration_error, fitted
 
-from seip_addon.core.errors import SeipError
+from seip_addon.core.base.errors import SeipError
 
 CATEGORIES = [category for group in CLASS_CATEGORIES.values() for category in group]
 

@@ -16,7 +16,7 @@ from headless import detect
 from headless.detection.detector import SHIPPED_DETECTOR, Detector, TrainingRecord
 from headless.detection.settings import NetworkSettings
 
-from seip_addon.core.errors import SeipError
+from seip_addon.core.base.errors import SeipError
 from seip_addon.scene.blend_file import save_blend
 from seip_addon.scene.write import write_result
 from tests.builders.scene_by_hand import make_scene

@@ -18,7 +18,7 @@ from headless.detection.settings import CLASS_CATEGORIES
 
 from PIL import Image
 
-from seip_addon.core.errors import SeipError
+from seip_addon.core.base.errors import SeipError
 from seip_addon.core.geometry.geo_reference import GeoReference
 from seip_addon.core.output.datasets.formats import CLASSES
 from tests.builders.scanned_street import ground_mesh, mounted, street_meshes, street_record, surface_of

@@ -8,7 +8,7 @@ from headless.detection.settings import NetworkSettings
 import pytest
 import torch
 
-from seip_addon.core.errors import SeipError
+from seip_addon.core.base.errors import SeipError
 
 NETWORK = NetworkSettings(width=8, blocks=(0, 0, 0), most_points=2)
 

@@ -19,10 +19,10 @@ from headless.detection.rules import CLASSES, RULES
 import bpy
 import numpy as np
 
+from seip_addon.core.base.errors import SeipError
+from seip_addon.core.base.progress import Progress, finish
 from seip_addon.core.choosing.placement.judgement import MEAN
-from seip_addon.core.errors import SeipError
 from seip_addon.core.output.results.placement_record import load_placement, recorded_sensor
-from seip_addon.core.progress import Progress, finish
 from seip_addon.core.sensing.lidar.catalogue import find_models, load_catalogue
 from seip_addon.core.sensing.weather import Weather
 from seip_addon.core.workflows.finalists import JUDGED_CLASSES, Finalist, JudgementRequest

@@ -13,8 +13,8 @@ from headless.options import new_parser
 
 import numpy as np
 
+from seip_addon.core.base.progress import finish
 from seip_addon.core.choosing.placement.deployment import sensor_at
-from seip_addon.core.progress import finish
 from seip_addon.core.sensing.scans.frame import Labels
 from seip_addon.core.sensing.scans.sensor import MountedSensor
 from seip_addon.core.sensing.scans.simulation import ScanSettings

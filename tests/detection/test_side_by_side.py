@@ -6,7 +6,7 @@ from headless.detection.detector_evaluation import side_by_side
 
 import pytest
 
-from seip_addon.core.progress import Progress, finish
+from seip_addon.core.base.progress import Progress, finish
 
 
 def counting(steps, name, seen=None):

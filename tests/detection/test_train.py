@@ -14,7 +14,7 @@ from headless.detection.settings import NetworkSettings
 
 import numpy as np
 
-from seip_addon.core.errors import SeipError
+from seip_addon.core.base.errors import SeipError
 from seip_addon.core.sensing.traffic.trajectories import RoadUser, Trajectories
 from seip_addon.scene.blend_file import save_blend
 from seip_addon.scene.write import write_result

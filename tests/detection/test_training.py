@@ -17,9 +17,9 @@ import numpy as np
 import pytest
 import torch
 
-from seip_addon.core.errors import SeipError
+from seip_addon.core.base.errors import SeipError
+from seip_addon.core.base.progress import finish
 from seip_addon.core.geometry.height_raster import HeightRaster
-from seip_addon.core.progress import finish
 from tests.builders.street_clouds import street_frame
 
 SMALL = NetworkSettings(width=16, blocks=(1, 1, 1), most_points=8)

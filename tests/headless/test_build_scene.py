@@ -5,7 +5,7 @@ from headless import build_scene
 import bpy
 import pytest
 
-from seip_addon.core.errors import SeipError
+from seip_addon.core.base.errors import SeipError
 from seip_addon.core.storage.files import locked_file
 from seip_addon.scene import contract
 

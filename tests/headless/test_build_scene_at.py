@@ -5,7 +5,7 @@ from headless import build_scene, runtime
 import bpy
 import pytest
 
-from seip_addon.core.errors import SeipError
+from seip_addon.core.base.errors import SeipError
 from seip_addon.core.world.openstreetmap import overpass
 from seip_addon.scene import contract
 from seip_addon.scene.read import read_scene

@@ -6,7 +6,7 @@ import bpy
 import numpy as np
 import pytest
 
-from seip_addon.core.errors import SeipError
+from seip_addon.core.base.errors import SeipError
 from seip_addon.core.world.openstreetmap.network_map import read_network_map
 from seip_addon.scene import contract
 from seip_addon.scene.read import read_scene

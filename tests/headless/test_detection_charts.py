@@ -17,7 +17,7 @@ import pytest
 import shapely
 from matplotlib.collections import PolyCollection
 
-from seip_addon.core.errors import SeipError
+from seip_addon.core.base.errors import SeipError
 from seip_addon.core.output.pictures import chart_style as style
 from tests.builders.charts import is_drawn, legend, line, record_figures, words
 

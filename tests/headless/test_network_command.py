@@ -13,9 +13,9 @@ from headless import network
 
 import pytest
 
-from seip_addon.core import sumo_programs
-from seip_addon.core.errors import SeipError
+from seip_addon.core.base.errors import SeipError
 from seip_addon.core.output.network.network_record import NetworkRecord
+from seip_addon.core.programs import sumo_programs
 from seip_addon.core.storage.json_dataclass import from_json
 from tests.builders.small_scene import save_small_scene
 

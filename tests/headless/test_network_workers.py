@@ -12,8 +12,8 @@ pytest.importorskip("distributed", reason="Dask is not installed: make environme
 
 from headless.network_tasks import run_jobs
 
-from seip_addon.core.dask_client import connected
-from seip_addon.core.errors import SeipError
+from seip_addon.core.base.errors import SeipError
+from seip_addon.core.programs.dask_client import connected
 
 pytestmark = pytest.mark.slow
 

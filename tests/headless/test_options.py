@@ -12,14 +12,14 @@ from headless.survey import add_options
 
 import pytest
 
+from seip_addon.core.base.errors import SeipError
+from seip_addon.core.base.limits import Limits
+from seip_addon.core.base.settings import settings_of
 from seip_addon.core.choosing.placement.objective import Objective
 from seip_addon.core.choosing.placement.scenarios import Scenarios
-from seip_addon.core.errors import SeipError
-from seip_addon.core.limits import Limits
 from seip_addon.core.sensing.scans.simulation import ScanSettings
 from seip_addon.core.sensing.scenarios.pose_errors import PoseErrors
 from seip_addon.core.sensing.visibility.settings import VisibilitySettings
-from seip_addon.core.settings import settings_of
 from seip_addon.core.site.candidates import CandidateSettings
 from seip_addon.core.workflows.survey_settings import SurveySettings
 

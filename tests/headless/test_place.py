@@ -17,9 +17,9 @@ from headless import place, runtime
 import bpy
 import pytest
 
+from seip_addon.core.base.errors import SeipError
 from seip_addon.core.choosing.placement.objective import ACCEPTED_MESSAGE
 from seip_addon.core.choosing.placement.scenarios import Scenarios
-from seip_addon.core.errors import SeipError
 from seip_addon.core.output.results.placement_record import comparable, load_placement
 
 ROOT = Path(__file__).resolve().parents[2]

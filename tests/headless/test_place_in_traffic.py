@@ -8,8 +8,8 @@ from headless import place
 import numpy as np
 import pytest
 
+from seip_addon.core.base.errors import SeipError
 from seip_addon.core.choosing.placement.scenarios import DEFAULT_COUNTS
-from seip_addon.core.errors import SeipError
 from seip_addon.core.output.results.file_names import TRAFFIC_PICTURES
 from seip_addon.core.sensing.traffic.trajectories import RoadUser, Trajectories
 from seip_addon.scene.result_folder import FILES

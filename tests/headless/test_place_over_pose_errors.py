@@ -7,8 +7,8 @@ from headless import place
 
 import pytest
 
+from seip_addon.core.base.errors import SeipError
 from seip_addon.core.choosing.placement.scenarios import DEFAULT_COUNTS
-from seip_addon.core.errors import SeipError
 from seip_addon.core.output.results.file_names import POSE_ERROR_PICTURES
 from seip_addon.scene.result_folder import FILES
 

@@ -5,7 +5,7 @@ from headless.options import new_parser
 
 import pytest
 
-from seip_addon.core.errors import SeipError
+from seip_addon.core.base.errors import SeipError
 
 
 @pytest.mark.parametrize(

@@ -14,9 +14,9 @@ from typing import Never
 
 from headless import runtime
 
-from seip_addon.core import progress
-from seip_addon.core.errors import SeipError
-from seip_addon.core.progress import Progress
+from seip_addon.core.base import progress
+from seip_addon.core.base.errors import SeipError
+from seip_addon.core.base.progress import Progress
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -86,7 +86,7 @@ def test_a_log_gets_a_line_every_ten_seconds_and_at_each_better_placement(capsys
 
 def test_a_narrow_terminal_cuts_the_phase_and_keeps_value_and_time() -> None:
     script = (
-        "from headless import runtime\nfrom seip_addon.core.progress import Progress\n"
+        "from headless import runtime\nfrom seip_addon.core.base.progress import Progress\n"
         "with runtime.progress_bar() as report:\n"
         "    report(Progress(0, 0, 'improving the placement', best='71% of the road', gap=0.052))\n"
     )

@@ -13,7 +13,7 @@ import bpy
 import numpy as np
 import pytest
 
-from seip_addon.core.errors import SeipError
+from seip_addon.core.base.errors import SeipError
 from seip_addon.core.sensing.scans.run_folder import load_frames
 from seip_addon.core.sensing.traffic.trajectories import RoadUser, Trajectories
 from seip_addon.core.storage.files import lock_folder

@@ -10,9 +10,9 @@ from headless import traffic
 import numpy as np
 import pytest
 
-from seip_addon.core.errors import SeipError
+from seip_addon.core.base.errors import SeipError
+from seip_addon.core.programs.sumo_programs import find_sumo
 from seip_addon.core.sensing.traffic.trajectories import Trajectories
-from seip_addon.core.sumo_programs import find_sumo
 from tests.sumo_here import needs_sumo
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from seip_addon.core.arrays import Boolean, Float
+from seip_addon.core.base.arrays import Boolean, Float
 
 _SEAM = 1e-13
 """Widening of triangles as a share of the distance, so that no ray passes between adjacent ones."""

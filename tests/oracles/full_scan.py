@@ -6,7 +6,7 @@ from headless.studies.full_scan import seen_by_tilted_full_scan
 
 import numpy as np
 
-from seip_addon.core.arrays import Boolean, Float
+from seip_addon.core.base.arrays import Boolean, Float
 from seip_addon.core.sensing.lidar.beams import BeamPattern
 from seip_addon.core.sensing.lidar.model import LidarModel
 from seip_addon.core.sensing.visibility.near_surfaces import near_surfaces

@@ -6,7 +6,7 @@ from headless.studies.full_frames import SLACK
 
 import numpy as np
 
-from seip_addon.core.arrays import Float
+from seip_addon.core.base.arrays import Float
 
 
 def grazes(origin: Float, direction: Float, triangles: Float, distance: float) -> bool:

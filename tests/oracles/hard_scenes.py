@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from seip_addon.core.arrays import Float
+from seip_addon.core.base.arrays import Float
 
 HALF_SIDE = 10.0
 """Half of the side of the street of most scenes, metres."""

@@ -6,14 +6,14 @@ import math
 
 import numpy as np
 
+from seip_addon.core.base.errors import SeipError
+from seip_addon.core.base.progress import finish
 from seip_addon.core.choosing.placement.cheapest import cheapest_for_share
 from seip_addon.core.choosing.placement.concave import COVERAGE, LOG_RETURNS
 from seip_addon.core.choosing.placement.problem import Placement, PlacementProblem
 from seip_addon.core.choosing.placement.risk import Risk
 from seip_addon.core.choosing.placement.search_limits import DEFAULT_LIMITS, SolverLimits
 from seip_addon.core.choosing.placement.solver import solve
-from seip_addon.core.errors import SeipError
-from seip_addon.core.progress import finish
 from tests.oracles.placement_case import PlacementCase
 from tests.oracles.placement_enumeration import (
     cheapest_price,

@@ -10,8 +10,8 @@ from typing import Any
 import bpy
 import numpy as np
 
+from seip_addon.core.base.progress import finish
 from seip_addon.core.choosing.placement.objective import Objective, placement_constraints
-from seip_addon.core.progress import finish
 from seip_addon.core.sensing.returns.occlusion import returns_in_traffic
 from seip_addon.core.sensing.returns.returns_grid import stored_returns
 from seip_addon.core.sensing.returns.road_users import road_users

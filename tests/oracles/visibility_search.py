@@ -12,7 +12,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from seip_addon.core.progress import finish
+from seip_addon.core.base.progress import finish
 from seip_addon.core.sensing.lidar.carla_dropoff import CarlaDropoff
 from seip_addon.core.sensing.lidar.model import DetectionLaw, LidarModel
 from seip_addon.core.sensing.lidar.range_equation import RangeEquation

@@ -2,8 +2,8 @@ import bpy
 import numpy as np
 import pytest
 
-from seip_addon.core.errors import SeipError
-from seip_addon.core.progress import finish
+from seip_addon.core.base.errors import SeipError
+from seip_addon.core.base.progress import finish
 from seip_addon.core.sensing.traffic.bodies import fitted_body
 from seip_addon.core.sensing.traffic.trajectories import CATEGORIES, RoadUser, Trajectories
 from seip_addon.scene import contract

@@ -7,7 +7,7 @@ from pathlib import Path
 import bpy
 import pytest
 
-from seip_addon.core.errors import SeipError
+from seip_addon.core.base.errors import SeipError
 from seip_addon.scene.blend_file import new_file, open_blend, save_blend
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -36,7 +36,7 @@ def test_a_disk_without_room_has_its_sentence_and_keeps_what_was_there(tmp_path)
     script = (
         "import resource, sys; from pathlib import Path\n"
         "import headless.runtime, bpy\n"
-        "from seip_addon.core.errors import SeipError\n"
+        "from seip_addon.core.base.errors import SeipError\n"
         "from seip_addon.scene.blend_file import new_file, save_blend\n"
         "new_file()\n"
         "mesh = bpy.data.meshes.new('much'); mesh.vertices.add(200_000)\n"

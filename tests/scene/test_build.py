@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 import shapely
 
+from seip_addon.core.base.progress import finish
 from seip_addon.core.geometry.geo_reference import GeoReference
 from seip_addon.core.geometry.solids import block
-from seip_addon.core.progress import finish
 from seip_addon.core.site.roles import Role
 from seip_addon.core.site.scene_geometry import ASSUMED, NamedArea
 from seip_addon.core.world.streetscape.model import SiteModel

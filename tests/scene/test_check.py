@@ -3,8 +3,8 @@
 import bpy
 import pytest
 
-from seip_addon.core.errors import SeipError
-from seip_addon.core.progress import finish
+from seip_addon.core.base.errors import SeipError
+from seip_addon.core.base.progress import finish
 from seip_addon.core.site.candidates import CandidateSettings
 from seip_addon.core.site.check import check_site
 from seip_addon.core.site.site import make_site

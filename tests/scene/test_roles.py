@@ -3,7 +3,7 @@
 import bpy
 import pytest
 
-from seip_addon.core.errors import SeipError
+from seip_addon.core.base.errors import SeipError
 from seip_addon.core.site.roles import Role
 from seip_addon.scene import roles
 from seip_addon.scene.read import read_scene

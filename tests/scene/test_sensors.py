@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from mathutils import Vector
 
-from seip_addon.core.errors import SeipError
+from seip_addon.core.base.errors import SeipError
 from seip_addon.core.geometry.orientation import orientation, rotated
 from seip_addon.core.sensing.lidar.catalogue import load_catalogue
 from seip_addon.core.site.scene_geometry import DEFAULT_REFLECTIVITY

@@ -19,7 +19,7 @@ from headless.studies.open_benchmark.table import (
 
 import pytest
 
-from seip_addon.core.errors import SeipError
+from seip_addon.core.base.errors import SeipError
 
 PRECISION = {"one": [0.2, 0.4, 0.6, 0.8], "two": [0.9, 0.7, 0.5, 0.1]}
 

@@ -22,7 +22,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent))
 import bpy
 from bl_ext.user_default.seip.seip_addon import preferences, scene_status
 from bl_ext.user_default.seip.seip_addon.panels import placement, results, sidebar
-from bl_ext.user_default.seip.seip_addon.session import SceneState, session
+from bl_ext.user_default.seip.seip_addon.state.session import SceneState, session
 from bl_ext.user_default.seip.seip_addon.viewport import search
 from driver import Steps, Window, play
 from mathutils import Vector

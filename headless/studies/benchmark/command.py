@@ -24,8 +24,8 @@ from headless.studies.benchmark.visibility import sampled_positions, visibility_
 
 import bpy
 
+from seip_addon.core.base.progress import finish
 from seip_addon.core.choosing.placement.objective import Objective, placement_problem
-from seip_addon.core.progress import finish
 from seip_addon.core.sensing.lidar.catalogue import find_models, load_catalogue
 from seip_addon.core.sensing.lidar.model import LidarModel, fields_of_view
 from seip_addon.core.sensing.scans.static_scene import static_scene

@@ -14,7 +14,7 @@ from headless.studies.benchmark.visibility import sampled_positions
 
 import numpy as np
 
-from seip_addon.core.arrays import Float
+from seip_addon.core.base.arrays import Float
 from seip_addon.core.sensing.lidar.model import LidarModel
 from seip_addon.core.sensing.visibility.chunks import compute_rows
 from seip_addon.core.sensing.visibility.ray_casting import make_ray_caster

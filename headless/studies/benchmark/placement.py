@@ -18,11 +18,11 @@ import numpy as np
 import pulp
 from pulp.apis.coin_api import pulp_cbc_path
 
-from seip_addon.core.arrays import Boolean, Integer
+from seip_addon.core.base.arrays import Boolean, Integer
+from seip_addon.core.base.progress import finish
 from seip_addon.core.choosing.placement.problem import PlacementProblem
 from seip_addon.core.choosing.placement.search_limits import SolverLimits
 from seip_addon.core.choosing.placement.solver import solve
-from seip_addon.core.progress import finish
 
 Solution = tuple[Integer | None, float]
 """Chosen poses (k,), or None, and the upper bound on the covered weight that the method proves, or infinity."""

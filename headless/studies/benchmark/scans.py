@@ -13,8 +13,8 @@ from headless.studies.full_frames import combined, differing, full_scan
 
 import numpy as np
 
-from seip_addon.core.arrays import Float
-from seip_addon.core.progress import finish
+from seip_addon.core.base.arrays import Float
+from seip_addon.core.base.progress import finish
 from seip_addon.core.sensing.lidar.model import LidarModel
 from seip_addon.core.sensing.scans.scanner import Scan
 from seip_addon.core.sensing.scans.sensor import MountedSensor, level_orientation

@@ -9,11 +9,11 @@ from functools import partial
 import bpy
 import numpy as np
 
-from seip_addon.core.arrays import Float, Integer
+from seip_addon.core.base.arrays import Float, Integer
+from seip_addon.core.base.progress import finish
 from seip_addon.core.choosing.placement.objective import Objective, placement_problem
 from seip_addon.core.choosing.placement.search_limits import SolverLimits
 from seip_addon.core.choosing.placement.solver import solve
-from seip_addon.core.progress import finish
 from seip_addon.core.sensing.lidar.model import LidarModel, fields_of_view
 from seip_addon.core.sensing.visibility.grid import compute_visibility
 from seip_addon.core.sensing.visibility.settings import VisibilitySettings

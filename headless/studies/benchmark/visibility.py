@@ -12,8 +12,8 @@ from headless.studies.full_scan import seen_by_tilted_full_scan
 
 import numpy as np
 
-from seip_addon.core.arrays import Boolean, Integer
-from seip_addon.core.errors import SeipError
+from seip_addon.core.base.arrays import Boolean, Integer
+from seip_addon.core.base.errors import SeipError
 from seip_addon.core.sensing.lidar.model import LidarModel
 from seip_addon.core.sensing.visibility.chunks import compute_rows, sharing_rays
 from seip_addon.core.sensing.visibility.near_surfaces import near_surfaces

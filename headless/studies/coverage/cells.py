@@ -6,13 +6,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from seip_addon.core.base.errors import SeipError
+from seip_addon.core.base.progress import Progress, within
 from seip_addon.core.choosing.placement.deployment import Deployment, deploy
 from seip_addon.core.choosing.placement.objective import Objective, placement_problem
 from seip_addon.core.choosing.placement.problem import Placement
 from seip_addon.core.choosing.placement.search_limits import DEFAULT_LIMITS, SolverLimits
 from seip_addon.core.choosing.placement.solver import solve, solve_greedy
-from seip_addon.core.errors import SeipError
-from seip_addon.core.progress import Progress, within
 from seip_addon.core.sensing.lidar.model import LidarModel
 from seip_addon.core.site.site import Site
 

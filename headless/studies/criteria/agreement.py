@@ -9,8 +9,8 @@ from headless.studies.rank_correlation import rank_agreements
 
 import numpy as np
 
-from seip_addon.core.arrays import Float, Integer
-from seip_addon.core.estimates import IntervalEstimate, percentiles
+from seip_addon.core.base.arrays import Float, Integer
+from seip_addon.core.base.estimates import IntervalEstimate, percentiles
 
 from .drawing import MIN_PLACEMENTS
 from .precision import PLACEMENT_SEED, Precisions

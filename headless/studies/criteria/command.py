@@ -29,9 +29,9 @@ from headless.studies.survey_options import add_rolling_shutter, add_survey_opti
 
 import bpy
 
+from seip_addon.core.base.errors import SeipError
+from seip_addon.core.base.limits import COUNT, SEED, SENSORS, TIME_STEP
 from seip_addon.core.choosing.placement.objective import Objective, check_objective
-from seip_addon.core.errors import SeipError
-from seip_addon.core.limits import COUNT, SEED, SENSORS, TIME_STEP
 from seip_addon.core.output.results.versions import versions
 from seip_addon.core.sensing.scans.simulation import ScanSettings
 from seip_addon.core.sensing.traffic.site_traffic import check_runs, require_own_traffic

@@ -24,10 +24,10 @@ from headless.studies.detection.sensor_configuration import SensorConfiguration
 
 import numpy as np
 
-from seip_addon.core.arrays import Float, Integer, Text
-from seip_addon.core.errors import SeipError
-from seip_addon.core.estimates import IntervalEstimate
-from seip_addon.core.progress import Progress
+from seip_addon.core.base.arrays import Float, Integer, Text
+from seip_addon.core.base.errors import SeipError
+from seip_addon.core.base.estimates import IntervalEstimate
+from seip_addon.core.base.progress import Progress
 from seip_addon.core.workflows.survey import Survey
 
 from .agreement import correlate

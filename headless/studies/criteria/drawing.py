@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from seip_addon.core.arrays import Integer
+from seip_addon.core.base.arrays import Integer
+from seip_addon.core.base.errors import SeipError
 from seip_addon.core.choosing.placement.problem import PlacementProblem
-from seip_addon.core.errors import SeipError
 
 MIN_PLACEMENTS = 4
 MAX_TRIES = 20_000  # draws for one placement before an error states that there are no more

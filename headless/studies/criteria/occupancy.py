@@ -7,7 +7,7 @@ from headless.detection.recordings import SampledRun
 
 import numpy as np
 
-from seip_addon.core.arrays import Boolean, Float
+from seip_addon.core.base.arrays import Boolean, Float
 from seip_addon.core.site.site import Targets
 
 INTERVAL = 0.5  # seconds between the instants that are looked at

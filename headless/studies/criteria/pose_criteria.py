@@ -16,10 +16,10 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from seip_addon.core.arrays import Boolean, Float, Integer
+from seip_addon.core.base.arrays import Boolean, Float, Integer
+from seip_addon.core.base.errors import SeipError
+from seip_addon.core.base.progress import Progress
 from seip_addon.core.choosing.placement.problem import PlacementProblem
-from seip_addon.core.errors import SeipError
-from seip_addon.core.progress import Progress
 
 from .vehicle_grid import VIEW_CELLS
 

@@ -11,8 +11,8 @@ from headless.detection.average_precision import (
 
 import numpy as np
 
-from seip_addon.core.arrays import Float, Text
-from seip_addon.core.estimates import RESAMPLES
+from seip_addon.core.base.arrays import Float, Text
+from seip_addon.core.base.estimates import RESAMPLES
 
 TRAFFIC_SEED, TRAINING_SEED, PLACEMENT_SEED = 0, 1, 2  # of resamples: draws of one must not follow from another's
 RESAMPLES_AT_ONCE = 100  # the number that needs a few hundred megabytes

@@ -7,12 +7,12 @@ from headless.detection.recordings import SampledRun
 
 import numpy as np
 
-from seip_addon.core.arrays import Integer
+from seip_addon.core.base.arrays import Integer
+from seip_addon.core.base.progress import Progress, within
 from seip_addon.core.choosing.placement.concave import LOG_RETURNS
 from seip_addon.core.choosing.placement.objective import Objective, placement_problem
 from seip_addon.core.choosing.placement.problem import PlacementProblem
 from seip_addon.core.choosing.placement.solver import solve
-from seip_addon.core.progress import Progress, within
 from seip_addon.core.sensing.scans.scanner import ReflectiveSurface
 from seip_addon.core.sensing.visibility.ray_casting import make_ray_caster
 from seip_addon.core.workflows.returns import survey_returns

@@ -11,7 +11,7 @@ import shapely
 from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
-from seip_addon.core.arrays import Boolean, Float, Integer
+from seip_addon.core.base.arrays import Boolean, Float, Integer
 from seip_addon.core.sensing.lidar.beams import BeamPattern
 from seip_addon.core.sensing.lidar.model import LidarModel
 from seip_addon.core.sensing.scans.beam_culling import BeamWindows

@@ -7,7 +7,7 @@ from headless.detection.recordings import SampledRun
 
 import numpy as np
 
-from seip_addon.core.arrays import Boolean, Float, Integer
+from seip_addon.core.base.arrays import Boolean, Float, Integer
 from seip_addon.core.sensing.lidar.model import LidarModel
 from seip_addon.core.sensing.lidar.noisy_returns import return_chance
 from seip_addon.core.sensing.scans.scanner import ReflectiveSurface

@@ -24,9 +24,9 @@ from headless.studies.coverage.cells import COUNTS, Case, Cell, solve_cell
 from headless.studies.detection.sensor_configuration import SensorConfiguration
 from headless.studies.false_positives import false_positives
 
-from seip_addon.core.arrays import Float
-from seip_addon.core.errors import SeipError
-from seip_addon.core.progress import Progress, within
+from seip_addon.core.base.arrays import Float
+from seip_addon.core.base.errors import SeipError
+from seip_addon.core.base.progress import Progress, within
 from seip_addon.core.sensing.traffic.run_overlap import require_independent, vehicle_positions
 from seip_addon.core.workflows.survey import Survey
 

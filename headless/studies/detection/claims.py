@@ -15,9 +15,9 @@ from headless.studies.mean_over_seeds import ANYTHING, CHANGE_OF_SHARE, COUNT, m
 
 import numpy as np
 
-from seip_addon.core.arrays import Float
-from seip_addon.core.counts import counted
-from seip_addon.core.estimates import SHARE, Interval
+from seip_addon.core.base.arrays import Float
+from seip_addon.core.base.counts import counted
+from seip_addon.core.base.estimates import SHARE, Interval
 
 FACTOR = 2.0  # largest ratio of two figures that are "about" the same
 MIN_SEEDS = 3  # seeds below which nothing is decided

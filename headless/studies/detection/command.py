@@ -25,8 +25,8 @@ from headless.studies.detection.results import StudyResults, describe, save_char
 from headless.studies.detection.sensor_configuration import SensorConfiguration
 from headless.studies.survey_options import add_rolling_shutter, add_survey_options
 
+from seip_addon.core.base.limits import TIME_STEP, Limits
 from seip_addon.core.choosing.placement.objective import Objective, check_objective
-from seip_addon.core.limits import TIME_STEP, Limits
 from seip_addon.core.sensing.scans.simulation import ScanSettings
 from seip_addon.core.sensing.traffic.site_traffic import check_runs, require_own_traffic
 from seip_addon.core.workflows.survey import Survey

@@ -20,8 +20,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, NullFormatter
 
-from seip_addon.core.arrays import Float
-from seip_addon.core.estimates import Interval
+from seip_addon.core.base.arrays import Float
+from seip_addon.core.base.estimates import Interval
 from seip_addon.core.output.pictures.chart_style import (
     DASHED,
     FAINT_COLOUR,

@@ -14,7 +14,7 @@ from headless.studies.rank_correlation import rank_agreements
 
 import numpy as np
 
-from seip_addon.core.estimates import SHARE, Interval
+from seip_addon.core.base.estimates import SHARE, Interval
 from seip_addon.core.storage.csv_table import save_csv
 
 from .case_study import DetectorOutcome, Traffic

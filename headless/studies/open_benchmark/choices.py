@@ -23,9 +23,9 @@ from headless.studies.benchmark.resource_usage import Expense
 import numpy as np
 from matplotlib.ticker import LogFormatter
 
-from seip_addon.core.arrays import Float, Integer
-from seip_addon.core.errors import SeipError
-from seip_addon.core.estimates import IntervalEstimate
+from seip_addon.core.base.arrays import Float, Integer
+from seip_addon.core.base.errors import SeipError
+from seip_addon.core.base.estimates import IntervalEstimate
 from seip_addon.core.output.pictures.chart_style import add_legend, colour, new_figure, set_title, style_axes
 from seip_addon.core.output.pictures.drawing import draw_callouts, save_png
 from seip_addon.core.output.pictures.palette import INK

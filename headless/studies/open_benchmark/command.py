@@ -31,8 +31,8 @@ from headless.studies.open_benchmark.table import (
     table_rows,
 )
 
-from seip_addon.core.errors import SeipError
-from seip_addon.core.estimates import IntervalEstimate
+from seip_addon.core.base.errors import SeipError
+from seip_addon.core.base.estimates import IntervalEstimate
 from seip_addon.core.storage.csv_table import save_csv
 
 SENSOR, COUNT, PLACEMENTS, EVERY = "os1_128", 2, 100, 10.0

@@ -15,9 +15,9 @@ from headless.studies.detection.case_study import split_untrained
 import bpy
 import numpy as np
 
-from seip_addon.core.errors import SeipError
-from seip_addon.core.estimates import IntervalEstimate
-from seip_addon.core.progress import Progress
+from seip_addon.core.base.errors import SeipError
+from seip_addon.core.base.estimates import IntervalEstimate
+from seip_addon.core.base.progress import Progress
 from seip_addon.core.sensing.lidar.catalogue import load_catalogue
 from seip_addon.core.sensing.scans.simulation import ScanSettings
 from seip_addon.scene.blend_file import open_blend

@@ -12,8 +12,8 @@ from headless.studies.random_sites.production import SiteSettings, make_site
 
 import bpy
 
-from seip_addon.core.errors import SeipError
-from seip_addon.core.progress import Progress
+from seip_addon.core.base.errors import SeipError
+from seip_addon.core.base.progress import Progress
 from seip_addon.core.workflows.site_building import SiteRequest, build_site, save_map
 from seip_addon.core.workflows.traffic_runs import traffic_folder
 from seip_addon.core.workflows.traffic_simulation import SIMULATION, SimulationSettings, listed_runs, simulate_runs

@@ -15,9 +15,9 @@ from headless.studies.rank_correlation import rank_agreements
 
 import numpy as np
 
-from seip_addon.core.arrays import Float
-from seip_addon.core.errors import SeipError
-from seip_addon.core.estimates import IntervalEstimate, student_reach
+from seip_addon.core.base.arrays import Float
+from seip_addon.core.base.errors import SeipError
+from seip_addon.core.base.estimates import IntervalEstimate, student_reach
 from seip_addon.core.storage.csv_table import save_csv
 from seip_addon.core.storage.files import read_small
 

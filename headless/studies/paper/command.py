@@ -38,14 +38,14 @@ from headless.studies.paper.traffic_runs import (
 import bpy
 import numpy as np
 
-from seip_addon.core.counts import counted
-from seip_addon.core.errors import SeipError
-from seip_addon.core.limits import Limits
+from seip_addon.core.base.counts import counted
+from seip_addon.core.base.errors import SeipError
+from seip_addon.core.base.limits import Limits
+from seip_addon.core.programs.sumo_programs import find_sumo
 from seip_addon.core.sensing.traffic.run_overlap import MATCH_RADIUS
 from seip_addon.core.site.candidates import PAPER_TYPES
 from seip_addon.core.site.scene_geometry import SceneGeometry
 from seip_addon.core.storage.files import whole_file
-from seip_addon.core.sumo_programs import find_sumo
 from seip_addon.core.workflows.survey import Survey
 from seip_addon.scene.read import read_scene
 

@@ -7,7 +7,7 @@ from headless.studies.claims import Claim
 from headless.studies.coverage.cells import CHARTED_WEIGHT, COUNTS, CoverageStudy
 from headless.studies.markdown import table
 
-from seip_addon.core.estimates import Interval
+from seip_addon.core.base.estimates import Interval
 
 from .published import DIFFERENCES, PUBLISHED_CLAIMS, PUBLISHED_GAINS
 

@@ -9,8 +9,8 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from seip_addon.core.errors import SeipError
-from seip_addon.core.progress import Progress
+from seip_addon.core.base.errors import SeipError
+from seip_addon.core.base.progress import Progress
 from seip_addon.core.storage.files import whole_file
 from seip_addon.core.storage.xml_stream import Attributes, quoted, read_tags
 from seip_addon.core.world.traffic_simulation.demand import poisson_departures

@@ -10,14 +10,14 @@ from headless.studies.paper.route_file import RouteDemand, read_demand, write_ru
 import numpy as np
 import shapely
 
-from seip_addon.core.arrays import Float
-from seip_addon.core.errors import SeipError
-from seip_addon.core.progress import Progress, within
+from seip_addon.core.base.arrays import Float
+from seip_addon.core.base.errors import SeipError
+from seip_addon.core.base.progress import Progress, within
+from seip_addon.core.programs.sumo_programs import find_sumo
 from seip_addon.core.sensing.traffic.run_overlap import VehiclePositions, overlap_of, vehicle_positions
 from seip_addon.core.sensing.traffic.source import TrafficFiles, read_net_offset
 from seip_addon.core.sensing.traffic.trajectories import Trajectories
 from seip_addon.core.site.scene_geometry import SceneGeometry, joined
-from seip_addon.core.sumo_programs import find_sumo
 from seip_addon.core.workflows.traffic_runs import traffic_folder
 from seip_addon.core.world.traffic_simulation.simulation import recorded_run, run_sumo
 from seip_addon.core.world.traffic_simulation.street_network import DRIVING, StreetNetwork, read_network

@@ -14,8 +14,8 @@ from headless import runtime
 from headless.options import new_parser, whole_number
 from headless.studies.random_sites.production import SiteSettings, make_site
 
-from seip_addon.core.limits import Limits
-from seip_addon.core.sumo_programs import find_sumo
+from seip_addon.core.base.limits import Limits
+from seip_addon.core.programs.sumo_programs import find_sumo
 
 SITES = Limits(1, 9999)
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from seip_addon.core.progress import Progress
+from seip_addon.core.base.progress import Progress
 from seip_addon.core.sensing.traffic.overlaps import find_overlaps
 from seip_addon.core.sensing.traffic.trajectories import SAMPLED, RoadUser, Trajectories, some_users
 

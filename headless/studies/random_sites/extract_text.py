@@ -7,7 +7,7 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 from PIL import Image, TiffImagePlugin
 
-from seip_addon.core.arrays import Float
+from seip_addon.core.base.arrays import Float
 from seip_addon.core.storage.files import whole_file
 
 from .street_plan import TURN_LANE_LENGTH, Arm, StreetPlan, Tags

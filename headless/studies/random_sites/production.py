@@ -8,16 +8,16 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from seip_addon.core.errors import SeipError
+from seip_addon.core.base.errors import SeipError
+from seip_addon.core.base.progress import Progress, within
 from seip_addon.core.output.results.versions import versions
-from seip_addon.core.progress import Progress, within
+from seip_addon.core.programs.sumo_programs import find_sumo
 from seip_addon.core.site.candidates import PAPER_TYPES, CandidateSettings
 from seip_addon.core.site.check import check_site
 from seip_addon.core.site.scene_geometry import SceneGeometry
 from seip_addon.core.site.site import Site
 from seip_addon.core.storage.files import digest, save_json
 from seip_addon.core.storage.source_digest import source_digest
-from seip_addon.core.sumo_programs import find_sumo
 from seip_addon.core.workflows.site_building import SiteRequest, build_site, save_map
 from seip_addon.core.workflows.survey import lay_out
 from seip_addon.core.workflows.survey_settings import SurveySettings

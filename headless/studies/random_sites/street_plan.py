@@ -12,7 +12,7 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 from shapely.ops import substring
 
-from seip_addon.core.arrays import Float
+from seip_addon.core.base.arrays import Float
 
 Random = np.random.Generator
 Tags = Mapping[str, str]

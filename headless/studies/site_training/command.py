@@ -31,10 +31,10 @@ from headless.studies.random_sites.varied_bodies import resized
 import bpy
 import numpy as np
 
-from seip_addon.core.errors import SeipError
+from seip_addon.core.base.errors import SeipError
+from seip_addon.core.base.limits import TIME_STEP
+from seip_addon.core.base.progress import Progress
 from seip_addon.core.geometry.orientation import orientation
-from seip_addon.core.limits import TIME_STEP
-from seip_addon.core.progress import Progress
 from seip_addon.core.sensing.lidar.catalogue import find_models, load_catalogue
 from seip_addon.core.sensing.lidar.model import LidarModel, fields_of_view
 from seip_addon.core.sensing.scans.sensor import MountedSensor

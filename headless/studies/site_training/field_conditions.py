@@ -19,7 +19,7 @@ from headless.detection.frames import LazyFrames, Recording
 import numpy as np
 from numpy.typing import NDArray
 
-from seip_addon.core.arrays import Boolean, Float
+from seip_addon.core.base.arrays import Boolean, Float
 from seip_addon.core.geometry.orientation import rotated
 from seip_addon.core.sensing.recordings.background import MARGIN, MARGIN_SHARE
 from seip_addon.core.sensing.recordings.recorded_frames import UNKNOWN_INTENSITY

@@ -19,6 +19,7 @@ from headless.studies.stability.robustness_rows import pose_rows, robust_rows, t
 from headless.studies.stability.weather import COUNT, SENSOR, weather_rows, weather_study
 from headless.studies.survey_options import add_survey_options
 
+from seip_addon.core.base.progress import Progress
 from seip_addon.core.choosing.placement.objective import DEFAULT_COUNT, Objective, check_objective, placement_problem
 from seip_addon.core.choosing.placement.problem import PlacementProblem
 from seip_addon.core.choosing.placement.risk import Risk
@@ -26,7 +27,6 @@ from seip_addon.core.choosing.placement.scenarios import Scenarios
 from seip_addon.core.choosing.robustness.comparison import Comparison
 from seip_addon.core.choosing.robustness.pose_study import pose_study
 from seip_addon.core.choosing.robustness.robust_problem import RobustProblem
-from seip_addon.core.progress import Progress
 from seip_addon.core.sensing.traffic.trajectories import Trajectories
 from seip_addon.core.workflows.survey import Survey, surroundings
 from seip_addon.core.workflows.traffic_runs import split_runs

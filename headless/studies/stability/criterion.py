@@ -13,12 +13,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 import shapely
 
-from seip_addon.core.arrays import Boolean, Float
+from seip_addon.core.base.arrays import Boolean, Float
+from seip_addon.core.base.estimates import NORMAL_QUANTILE, IntervalEstimate
+from seip_addon.core.base.progress import Progress, within
 from seip_addon.core.choosing.placement.deployment import weighted_share
 from seip_addon.core.choosing.placement.objective import Objective, Solution, target_weights
-from seip_addon.core.estimates import NORMAL_QUANTILE, IntervalEstimate
 from seip_addon.core.geometry.plan import surface_height
-from seip_addon.core.progress import Progress, within
 from seip_addon.core.sensing.lidar.model import LidarModel, fields_of_view
 from seip_addon.core.sensing.scans.sensor import MountedSensor
 from seip_addon.core.sensing.visibility.grid import compute_visibility

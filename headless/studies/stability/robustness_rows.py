@@ -4,9 +4,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from seip_addon.core.base.estimates import IntervalEstimate, mean_of
 from seip_addon.core.choosing.robustness.comparison import Comparison, EvaluatedPlacement
 from seip_addon.core.choosing.robustness.pose_study import NOTABLE_LOSS, PoseStudy
-from seip_addon.core.estimates import IntervalEstimate, mean_of
 
 from .page import Row
 

@@ -6,10 +6,10 @@ import math
 from collections.abc import Generator, Sequence
 from dataclasses import dataclass, replace
 
-from seip_addon.core.arrays import Boolean, Integer
+from seip_addon.core.base.arrays import Boolean, Integer
+from seip_addon.core.base.progress import Progress, within
 from seip_addon.core.choosing.placement.objective import Objective, placement_problem
 from seip_addon.core.choosing.placement.solver import solve
-from seip_addon.core.progress import Progress, within
 from seip_addon.core.sensing.visibility.grid import compute_visibility
 from seip_addon.core.sensing.weather import weather_of
 from seip_addon.core.site.scene_geometry import SceneGeometry

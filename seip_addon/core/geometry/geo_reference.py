@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import Float
+from ..base.arrays import Float
 
 _SEMI_MAJOR_AXIS, _FLATTENING = 6_378_137.0, 1 / 298.257223563  # of WGS 84; GRS 80 differs by 0.1 mm
 _THIRD_FLATTENING = _FLATTENING / (2 - _FLATTENING)

@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..arrays import Float
+from ..base.arrays import Float
 
 _REACH = 3.0  # standard deviations at which a Gaussian is cut off
 _MIN_WEIGHT = 1e-3  # least share of a Gaussian's weight on known heights

@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..arrays import Float
+from ..base.arrays import Float
 
 MAX_SCALE = 20.0  # pixels per metre
 LEAST_OF_FITTED = 0.5  # smallest scale, in scales at which everything fits

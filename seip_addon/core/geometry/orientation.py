@@ -13,7 +13,7 @@ import math
 
 import numpy as np
 
-from ..arrays import Float
+from ..base.arrays import Float
 
 VERTICAL_SINE = 1 - 1e-12  # sine of the tilt from which on azimuth zero counts as pointing straight down, or up
 UNIT_TOLERANCE = 1e-3  # of rotations and quaternions in files, which have few digits

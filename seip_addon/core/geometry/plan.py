@@ -7,7 +7,7 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from ..arrays import Boolean, Float, Integer
+from ..base.arrays import Boolean, Float, Integer
 
 MIN_AREA = 1e-9  # square metres in plan; smaller triangles are vertical and cover no area
 

@@ -11,8 +11,8 @@ from types import ModuleType
 
 import numpy as np
 
-from ..arrays import Float
-from ..errors import SeipError
+from ..base.arrays import Float
+from ..base.errors import SeipError
 from .geo_reference import GeoReference, TransverseMercator, projection
 
 HORIZONTAL = {7415: 28992, 5554: 25831, 5555: 25832, 5556: 25833}

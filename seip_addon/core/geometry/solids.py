@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import Float
+from ..base.arrays import Float
 
 POST_SIDES = 6
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import Boolean, Float, Integer
+from ..base.arrays import Boolean, Float, Integer
 
 _COORDINATE_BITS = 16  # bits of each coordinate, for the order of triangles in space
 _MIN_BLOCK_TRIANGLES = 16  # least number of triangles in a block

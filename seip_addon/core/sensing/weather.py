@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from ..counts import typed_number
-from ..errors import SeipError
-from ..settings import setting
+from ..base.counts import typed_number
+from ..base.errors import SeipError
+from ..base.settings import setting
 from ..site.scene_geometry import DEFAULT_REFLECTIVITY, Mesh, SceneGeometry
 from .lidar.model import LidarModel
 

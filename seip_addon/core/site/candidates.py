@@ -10,12 +10,12 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from ..arrays import Boolean, Float, Integer, Text
-from ..counts import counted, typed_number
-from ..errors import SeipError
+from ..base.arrays import Boolean, Float, Integer, Text
+from ..base.counts import counted, typed_number
+from ..base.errors import SeipError
+from ..base.settings import setting
 from ..geometry.orientation import orientation
 from ..geometry.plan import outline, surface_height
-from ..settings import setting
 from .obstruction import inside_any, post_blocked
 from .pavement_sampling import spread
 from .post_rules import ALLOWED, ASSUMED_POLES, RULES, AllowedName, check_allowed, excluded_posts

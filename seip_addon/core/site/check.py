@@ -11,11 +11,11 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from ..arrays import Float
-from ..counts import counted
-from ..errors import SeipError
+from ..base.arrays import Float
+from ..base.counts import counted
+from ..base.errors import SeipError
+from ..base.progress import Progress
 from ..geometry.plan import heights_over, outline, signed_area, surface_height
-from ..progress import Progress
 from ..storage.files import digest
 from .scene_geometry import ASSUMED, Pole, SceneGeometry
 from .site import Site

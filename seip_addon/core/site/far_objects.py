@@ -15,8 +15,8 @@ import shapely
 from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
-from ..arrays import Boolean, Float
-from ..counts import counted
+from ..base.arrays import Boolean, Float
+from ..base.counts import counted
 from .scene_geometry import Mesh, SceneGeometry
 
 _RANGE_SLACK = 1.0

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..limits import DISTANCE, PRICE
+from ..base.limits import DISTANCE, PRICE
 from ..storage.toml_table import REQUIRED, Key, number, parse_toml, read_table, toml_text
 from .candidates import Candidates
 

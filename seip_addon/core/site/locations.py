@@ -9,7 +9,7 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from ..arrays import Float
+from ..base.arrays import Float
 from ..geometry.plan import outline
 from .scene_geometry import NamedArea, SceneGeometry
 

@@ -8,7 +8,7 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from ..arrays import Boolean, Float
+from ..base.arrays import Boolean, Float
 from ..geometry.winding_number import enclosed
 from .scene_geometry import Mesh, SceneGeometry, joined
 

@@ -6,8 +6,8 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from ..arrays import Float, Integer
-from ..errors import SeipError
+from ..base.arrays import Float, Integer
+from ..base.errors import SeipError
 
 _FINE_STEPS = 8
 """Fine grid steps per candidate spacing: a strip wider than an eighth of it gets candidates."""

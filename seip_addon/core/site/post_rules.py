@@ -10,8 +10,8 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from ..arrays import Boolean, Float
-from ..errors import SeipError
+from ..base.arrays import Boolean, Float
+from ..base.errors import SeipError
 from ..geometry.plan import closed, without
 
 RuleName = Literal["cycle-tracks", "driveways", "landings", "private", "islands", "power-poles"]

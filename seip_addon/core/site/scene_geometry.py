@@ -9,7 +9,7 @@ import numpy as np
 from shapely import Polygon
 from shapely.geometry.base import BaseGeometry
 
-from ..arrays import Float
+from ..base.arrays import Float
 from ..geometry.geo_reference import GeoReference
 from .post_rules import KeepOffArea, RuleName
 from .sources import SourceCount, count_sources

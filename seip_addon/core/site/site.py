@@ -10,8 +10,8 @@ from types import MappingProxyType
 
 from shapely.geometry.base import BaseGeometry
 
-from ..arrays import Float
-from ..errors import SeipError
+from ..base.arrays import Float
+from ..base.errors import SeipError
 from ..geometry.geo_reference import GeoReference
 from .candidates import Candidates, CandidateSettings, generate_candidates
 from .far_objects import without_far_objects

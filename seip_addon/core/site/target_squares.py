@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..arrays import Float
+from ..base.arrays import Float
 from .site import Targets
 
 

@@ -10,8 +10,8 @@ import shapely
 from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
-from ..arrays import Float
-from ..errors import SeipError
+from ..base.arrays import Float
+from ..base.errors import SeipError
 from ..geometry.plan import surface_height
 from .scene_geometry import NamedArea
 

@@ -9,8 +9,8 @@ from dataclasses import replace
 import numpy as np
 from shapely.geometry.base import BaseGeometry
 
-from ..arrays import Boolean, Float
-from ..errors import SeipError
+from ..base.arrays import Boolean, Float
+from ..base.errors import SeipError
 from .candidates import Candidates, headings
 
 NOTHING_BEFORE = "looking past all targets"

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.lib import format as npy
 from numpy.typing import NDArray
 
-from ..errors import SeipError
+from ..base.errors import SeipError
 from .files import whole_file
 
 READ_ERRORS = (

@@ -19,7 +19,7 @@ from typing import Any, NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import SeipError
+from ..base.errors import SeipError
 
 _UMASK = os.umask(0)  # read once at import, because reading changes it for all threads
 os.umask(_UMASK)

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from ..errors import SeipError
+from ..base.errors import SeipError
 
 PLACEMENT = "placement.json"
 """File of every folder that contains a placement."""

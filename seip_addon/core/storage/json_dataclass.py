@@ -10,8 +10,8 @@ from functools import cache, partial
 from types import NoneType, UnionType
 from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
 
-from ..errors import SeipError
-from ..settings import settings_of
+from ..base.errors import SeipError
+from ..base.settings import settings_of
 from .files import parse_json
 
 Value = TypeVar("Value")

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeGuard
 
-from ..errors import SeipError
-from ..limits import MAP_NUMBER, Limits
+from ..base.errors import SeipError
+from ..base.limits import MAP_NUMBER, Limits
 from .files import check_regular
 
 Reader = Callable[[Any], Any]  # converts a value; raises a `ValueError` that names the accepted values

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import BinaryIO, cast
 from xml.parsers import expat  # document types, through which XML does harm, are refused below
 
-from ..errors import SeipError
-from ..progress import Progress
+from ..base.errors import SeipError
+from ..base.progress import Progress
 
 Attributes = dict[str, str]
 

@@ -6,10 +6,10 @@ from collections.abc import Generator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..child_process import run_logged
-from ..errors import SeipError
+from ..base.errors import SeipError
+from ..base.progress import Progress
 from ..output.results.detection_record import FORMATS, parsed_detection
-from ..progress import Progress
+from ..programs.child_process import run_logged
 from ..sensing.weather import Weather
 
 RECORD, ERRORS = "detection.json", "errors.png"

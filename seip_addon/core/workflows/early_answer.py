@@ -10,13 +10,13 @@ from typing import TypeVar
 
 import numpy as np
 
-from ..arrays import Integer
+from ..base.arrays import Integer
+from ..base.errors import SeipError
+from ..base.progress import Progress, altered
 from ..choosing.placement.objective import Objective, criterion_of, placement_constraints, placement_problem
 from ..choosing.placement.problem import Placement
 from ..choosing.placement.search_limits import SolverLimits
 from ..choosing.placement.solver import solve
-from ..errors import SeipError
-from ..progress import Progress, altered
 from ..sensing.returns.returns_grid import compute_returns
 from ..sensing.returns.road_users import road_users
 from ..sensing.visibility.grid import compute_visibility

@@ -14,16 +14,16 @@ from typing import TypeVar
 
 import numpy as np
 
-from ..arrays import Boolean, Integer
+from ..base.arrays import Boolean, Integer
+from ..base.errors import SeipError
+from ..base.progress import Progress, within
 from ..choosing.placement.judgement import DEFAULT_FINALISTS, Judgement
 from ..choosing.placement.objective import Objective, Solution, criterion_of, placement_problem
 from ..choosing.placement.problem import TIE_TOLERANCE, PlacementProblem, assess
 from ..choosing.placement.search_limits import SolverLimits
 from ..choosing.placement.solver import solve
 from ..choosing.robustness.gain_band import with_gain_band
-from ..errors import SeipError
 from ..output.results.placement_record import RecordedSensor, recorded_sensor
-from ..progress import Progress, within
 from ..site.site import Site
 from ..storage.files import save_json
 from ..storage.json_dataclass import from_json

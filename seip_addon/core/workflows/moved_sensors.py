@@ -8,15 +8,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..arrays import Boolean, Float
+from ..base.arrays import Boolean, Float
+from ..base.errors import SeipError
+from ..base.progress import Progress
 from ..choosing.placement.deployment import Sensor, deployment_of, sensor_at
 from ..choosing.placement.objective import MOVED, Objective, Solution, criterion_of, target_weights
 from ..choosing.placement.problem import Placement
 from ..choosing.robustness.gain_band import with_gain_band
-from ..errors import SeipError
 from ..geometry.orientation import angles_of, degrees, tilt_degrees
 from ..geometry.plan import surface_height
-from ..progress import Progress
 from ..sensing.scans.sensor import MountedSensor
 from ..sensing.visibility.sight_lines import pose_at
 from ..sensing.visibility.visibility_model import VisibilityModel, visibility_model

@@ -16,14 +16,14 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from ..arrays import Float
-from ..distinct_names import distinct_names
-from ..errors import SeipError
+from ..base.arrays import Float
+from ..base.distinct_names import distinct_names
+from ..base.errors import SeipError
+from ..base.limits import LATITUDE, LONGITUDE, WEIGHT, Limits
+from ..base.progress import Progress
 from ..geometry.geo_reference import GeoReference
 from ..geometry.solids import from_faces
 from ..geometry.tangent_plane import plan_metres
-from ..limits import LATITUDE, LONGITUDE, WEIGHT, Limits
-from ..progress import Progress
 from ..site.roles import Role
 from ..storage.files import digest, read_small
 from ..world.openstreetmap.crossings import SAME_JUNCTION, selected_junctions

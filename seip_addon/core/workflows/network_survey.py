@@ -8,14 +8,14 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..base.errors import SeipError
+from ..base.progress import Progress
 from ..choosing.network.frontier import SolvedBudget
 from ..choosing.network.site_problem import SiteProblem, check_problem
 from ..choosing.placement.concave import relative_gap
 from ..choosing.placement.deployment import deploy, pose_prices
 from ..choosing.placement.objective import Objective, Solution, criterion_of, placement_constraints
 from ..choosing.placement.problem import Placement
-from ..errors import SeipError
-from ..progress import Progress
 from .network_sites import NetworkPlace
 from .returns import survey_returns
 from .survey import Survey

@@ -9,7 +9,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..acceptance import Acceptance, until_accepted
+from ..base.acceptance import Acceptance, until_accepted
+from ..base.errors import SeipError
+from ..base.progress import Progress
 from ..choosing.placement.cheapest import UNPROVEN_PRICE, cheapest_for_share
 from ..choosing.placement.deployment import Deployment, deploy
 from ..choosing.placement.objective import (
@@ -33,8 +35,6 @@ from ..choosing.robustness.comparison import Comparison
 from ..choosing.robustness.gain_band import with_gain_band
 from ..choosing.robustness.pose_study import pose_study
 from ..choosing.robustness.robust_problem import RobustProblem
-from ..errors import SeipError
-from ..progress import Progress
 from ..sensing.lidar.model import LidarModel
 from ..site.site import Site
 from .returns import crossing_returns, place_by_returns, survey_returns

@@ -11,10 +11,11 @@ from pathlib import Path
 
 import numpy as np
 
+from ..base.progress import Progress
+from ..base.settings import setting
 from ..output.datasets.dataset_folder import write_dataset
 from ..output.datasets.formats import FORMATS
 from ..output.datasets.sample import SPLITS, TrafficRun
-from ..progress import Progress
 from ..sensing.scans.run_folder import Record, Run, load_frames, write_run
 from ..sensing.scans.sensor import MountedSensor
 from ..sensing.scans.simulation import ScanSettings, Simulation, frame_times, prepare
@@ -22,7 +23,6 @@ from ..sensing.scans.static_scene import static_scene
 from ..sensing.traffic.bodies import fitted_body
 from ..sensing.traffic.trajectories import Trajectories
 from ..sensing.visibility.ray_casting import engine_name
-from ..settings import setting
 from ..site.scene_geometry import SceneGeometry
 
 SAME_TIME_TOLERANCE = 1e-6

@@ -7,12 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..base.errors import SeipError
+from ..base.progress import Progress
 from ..choosing.placement.deployment import pose_prices
 from ..choosing.placement.objective import MOVED, Solution
-from ..errors import SeipError
 from ..output.results.geographic_files import LOCATED_FILES, missing_sentence
 from ..output.results.placement_record import PlacementRecord, Provenance, placement_record
-from ..progress import Progress
 from ..sensing.lidar.catalogue import find_models, load_catalogue
 from ..sensing.returns.returns_grid import returns_key
 from ..sensing.returns.road_users import road_users

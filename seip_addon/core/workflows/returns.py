@@ -10,7 +10,9 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from ..arrays import Float, Integer
+from ..base.arrays import Float, Integer
+from ..base.errors import SeipError
+from ..base.progress import Progress
 from ..choosing.placement.concave import LOG_RETURNS
 from ..choosing.placement.objective import (
     CHOSEN_FOR,
@@ -24,8 +26,6 @@ from ..choosing.placement.problem import Placement, PlacementProblem
 from ..choosing.placement.returns_summary import ENOUGH_RETURNS, CrossingReturns, ReturnsSummary
 from ..choosing.placement.search_limits import SolverLimits
 from ..choosing.placement.solver import solve, solve_greedy
-from ..errors import SeipError
-from ..progress import Progress
 from ..sensing.returns.expected_returns import expected_returns
 from ..sensing.returns.occlusion import returns_in_traffic
 from ..sensing.returns.returns_grid import ReturnsGrid, returns_key, stored_returns

@@ -9,12 +9,12 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from ..arrays import Float
-from ..errors import SeipError
+from ..base.arrays import Float
+from ..base.errors import SeipError
+from ..base.progress import Progress
+from ..base.settings import setting
 from ..geometry.geo_reference import GeoReference
 from ..geometry.plan import united
-from ..progress import Progress
-from ..settings import setting
 from ..storage.files import whole_file
 from ..world.elevation.at_place import MapSurroundings, TerrainRequest, with_terrain
 from ..world.elevation.obstacles import Merging

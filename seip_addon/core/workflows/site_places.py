@@ -4,8 +4,8 @@ from collections.abc import Generator
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..distinct_names import distinct_names
-from ..progress import Progress
+from ..base.distinct_names import distinct_names
+from ..base.progress import Progress
 from ..world.opendrive.junctions import STREETS, streets_of_junctions
 from ..world.opendrive.read import read_map
 from ..world.openstreetmap.crossings import Crossing, named_crossings

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
-from ..arrays import Integer
+from ..base.arrays import Integer
+from ..base.progress import Progress
 from ..choosing.placement.deployment import Deployment, deploy
-from ..progress import Progress
 from ..sensing.lidar.carla_dropoff import CarlaDropoff
 from ..sensing.lidar.model import LidarModel, fields_of_view
 from ..sensing.visibility.float32_precision import rounding_warnings

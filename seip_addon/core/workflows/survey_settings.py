@@ -8,13 +8,13 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
+from ..base.settings import setting
 from ..choosing.placement.integer_program import check_solver
 from ..choosing.placement.search_limits import DEFAULT_EFFORT, SolverLimits
 from ..sensing.lidar.catalogue import find_models, load_catalogue
 from ..sensing.lidar.model import LidarModel
 from ..sensing.visibility.settings import Engine, VisibilitySettings
 from ..sensing.weather import Weather
-from ..settings import setting
 from ..site.candidates import CandidateSettings
 from ..site.installed_cost import InstalledCost
 from ..storage.json_dataclass import as_json

@@ -8,8 +8,8 @@ from itertools import product
 from pathlib import Path
 from typing import TypeVar
 
-from ..errors import SeipError
-from ..progress import Progress
+from ..base.errors import SeipError
+from ..base.progress import Progress
 from ..sensing.traffic.run_overlap import require_independent, vehicle_positions
 from ..sensing.traffic.site_traffic import check_runs, load_trajectories
 from ..sensing.traffic.trajectories import Trajectories

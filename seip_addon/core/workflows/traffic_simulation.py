@@ -10,11 +10,11 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from ..counts import counted
-from ..errors import SeipError
-from ..progress import Progress, within
+from ..base.counts import counted
+from ..base.errors import SeipError
+from ..base.progress import Progress, within
+from ..base.settings import setting
 from ..sensing.traffic.trajectories import Trajectories
-from ..settings import setting
 from ..site.scene_geometry import SceneGeometry
 from ..storage.files import content_fault, locked_file, parse_json, read_small, save_json, unfinished_name
 from ..world.traffic_simulation.demand import Demand

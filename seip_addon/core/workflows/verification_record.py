@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from ..distinct_names import distinct_names
+from ..base.distinct_names import distinct_names
 from ..output.pictures.verification import save_changes_picture, save_returns_chart
 from ..output.results.file_names import VERIFICATION_FILE, VERIFICATION_PICTURES
 from ..output.results.verification_record import SCHEMA, RecordedChange, VerificationRecord

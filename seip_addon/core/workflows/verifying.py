@@ -12,10 +12,10 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from ..arrays import Boolean, Float, Integer
-from ..errors import SeipError
+from ..base.arrays import Boolean, Float, Integer
+from ..base.errors import SeipError
+from ..base.progress import Progress
 from ..geometry.plan import surface_height
-from ..progress import Progress
 from ..sensing.recordings.background import Background, learn_background
 from ..sensing.recordings.comparison import (
     FARTHER,

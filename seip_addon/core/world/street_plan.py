@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 
-from ..arrays import Float, Integer
+from ..base.arrays import Float, Integer
 from ..geometry.tangent_plane import plan_metres
 from .opendrive.lanes import LaneSurface
 from .opendrive.road_map import Junction, RoadMap

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from seip_addon.core.errors import SeipError
+from seip_addon.core.base.errors import SeipError
 from seip_addon.core.sensing.lidar.catalogue import load_catalogue
 from seip_addon.core.sensing.weather import WET_FACTOR, Weather, weather_of
 from seip_addon.core.site.scene_geometry import DEFAULT_REFLECTIVITY

@@ -9,7 +9,7 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from seip_addon.core.errors import SeipError
+from seip_addon.core.base.errors import SeipError
 from seip_addon.core.site.candidates import generate_candidates
 from seip_addon.core.site.pavement_sampling import spread
 from seip_addon.core.site.scene_geometry import Mesh, NamedArea, Pole

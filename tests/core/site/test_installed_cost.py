@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import pytest
 
+from seip_addon.core.base.errors import SeipError
+from seip_addon.core.base.progress import finish
 from seip_addon.core.choosing.placement.deployment import pose_prices
 from seip_addon.core.choosing.placement.objective import Objective
-from seip_addon.core.errors import SeipError
-from seip_addon.core.progress import finish
 from seip_addon.core.site.installed_cost import load_installed_cost
 from seip_addon.core.workflows.placing import optimise
 from tests.builders.small_junction import Example, make_example

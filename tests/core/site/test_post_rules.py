@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import shapely
 
-from seip_addon.core.errors import SeipError
+from seip_addon.core.base.errors import SeipError
 from seip_addon.core.site.candidates import generate_candidates
 from seip_addon.core.site.post_rules import RULES, KeepOffArea
 from seip_addon.core.site.scene_geometry import Mesh, Pole

@@ -5,8 +5,8 @@ import dataclasses
 import numpy as np
 import pytest
 
+from seip_addon.core.base.progress import finish
 from seip_addon.core.geometry.plan import outline
-from seip_addon.core.progress import finish
 from seip_addon.core.site.candidates import CandidateSettings
 from seip_addon.core.site.check import SceneContents, Surface, check_site
 from seip_addon.core.site.scene_geometry import Mesh, Pole, SceneGeometry

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import shapely
 
-from seip_addon.core.errors import SeipError
+from seip_addon.core.base.errors import SeipError
 from seip_addon.core.geometry.plan import surface_height
 from seip_addon.core.site.scene_geometry import NamedArea
 from seip_addon.core.site.targets import generate_targets

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from seip_addon.core.errors import SeipError
+from seip_addon.core.base.errors import SeipError
 from seip_addon.core.storage.array_file import ArrayFile
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -67,7 +67,7 @@ def test_a_claim_of_64_gib_in_a_foreign_file_costs_no_memory(tmp_path):
         archive.writestr("points.npy", content.getvalue() + bytes(80))
     script = (
         "import sys\nfrom pathlib import Path\n"
-        "from seip_addon.core.errors import SeipError\nfrom seip_addon.core.storage.array_file import read_npz\n"
+        "from seip_addon.core.base.errors import SeipError\nfrom seip_addon.core.storage.array_file import read_npz\n"
         "try:\n    read_npz(Path(sys.argv[1]), 1 << 40)\nexcept SeipError as error:\n    print(error)\n"
     )
     done = subprocess.run(  # noqa: S603  # our own script

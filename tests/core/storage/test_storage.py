@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from seip_addon.core.errors import SeipError
+from seip_addon.core.base.errors import SeipError
 from seip_addon.core.storage.files import lock_folder, locked_file, save_json, whole_file
 
 ROOT = Path(__file__).resolve().parents[3]

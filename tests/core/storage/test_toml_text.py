@@ -2,7 +2,7 @@
 
 import pytest
 
-from seip_addon.core.errors import SeipError
+from seip_addon.core.base.errors import SeipError
 from seip_addon.core.sensing.lidar.catalogue import load_catalogue
 from seip_addon.core.site.installed_cost import load_installed_cost
 from seip_addon.core.world.streetscape.site_file import read_site_description

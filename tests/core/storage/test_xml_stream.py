@@ -6,8 +6,8 @@ import time
 
 import pytest
 
-from seip_addon.core.errors import SeipError
-from seip_addon.core.progress import finish
+from seip_addon.core.base.errors import SeipError
+from seip_addon.core.base.progress import finish
 from seip_addon.core.storage import xml_stream
 from seip_addon.core.storage.xml_stream import opened, read_tags
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from seip_addon.core.progress import finish
+from seip_addon.core.base.progress import finish
 from seip_addon.core.site.candidates import CandidateSettings
 from seip_addon.core.workflows.survey import lay_out, see
 from seip_addon.core.workflows.survey_settings import SurveySettings

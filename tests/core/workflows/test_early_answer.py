@@ -6,8 +6,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from seip_addon.core.base.progress import Progress, finish
 from seip_addon.core.choosing.placement.objective import Objective
-from seip_addon.core.progress import Progress, finish
 from seip_addon.core.sensing.returns.returns_grid import compute_returns
 from seip_addon.core.sensing.returns.road_users import road_users
 from seip_addon.core.workflows import early_answer as early

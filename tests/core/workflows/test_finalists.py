@@ -6,13 +6,13 @@ from datetime import UTC, datetime
 import numpy as np
 import pytest
 
+from seip_addon.core.base.errors import SeipError
+from seip_addon.core.base.progress import finish
 from seip_addon.core.choosing.placement.judgement import MEAN, Figure, JudgedFinalist, Judgement
 from seip_addon.core.choosing.placement.objective import Objective, placement_problem
 from seip_addon.core.choosing.placement.scenarios import Scenarios
-from seip_addon.core.errors import SeipError
 from seip_addon.core.output.results.answer import answer, change_text
 from seip_addon.core.output.results.placement_record import Provenance, parsed_record
-from seip_addon.core.progress import finish
 from seip_addon.core.workflows.finalists import (
     MOVED_BY,
     JudgementRequest,

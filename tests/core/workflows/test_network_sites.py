@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 import shapely
 
-from seip_addon.core.errors import SeipError
+from seip_addon.core.base.errors import SeipError
+from seip_addon.core.base.progress import finish
 from seip_addon.core.geometry.geo_reference import GeoReference
-from seip_addon.core.progress import finish
 from seip_addon.core.site.roles import Role
 from seip_addon.core.workflows.network_sites import (
     NetworkPlace,

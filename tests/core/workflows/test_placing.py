@@ -6,11 +6,11 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from seip_addon.core.acceptance import Acceptance
+from seip_addon.core.base.acceptance import Acceptance
+from seip_addon.core.base.errors import SeipError
+from seip_addon.core.base.progress import finish
 from seip_addon.core.choosing.placement.objective import ACCEPTED_MESSAGE, Objective
 from seip_addon.core.choosing.placement.scenarios import Scenarios
-from seip_addon.core.errors import SeipError
-from seip_addon.core.progress import finish
 from seip_addon.core.sensing.scenarios.pose_errors import PoseErrors
 from seip_addon.core.workflows.moved_sensors import evaluate_moved_sensors
 from seip_addon.core.workflows.placing import place, with_context

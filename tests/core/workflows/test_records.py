@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 import shapely
 
+from seip_addon.core.base.errors import SeipError
+from seip_addon.core.base.progress import finish
 from seip_addon.core.choosing.placement.objective import Objective
-from seip_addon.core.errors import SeipError
 from seip_addon.core.output.results.placement_record import Provenance, load_placement, save_placement
-from seip_addon.core.progress import finish
 from seip_addon.core.site.scene_geometry import NamedArea
 from seip_addon.core.workflows.placing import place, with_context
 from seip_addon.core.workflows.records import inputs_of, record_of, restored_solution

@@ -2,8 +2,8 @@
 
 import pytest
 
-from seip_addon.core.errors import SeipError
-from seip_addon.core.progress import finish
+from seip_addon.core.base.errors import SeipError
+from seip_addon.core.base.progress import finish
 from seip_addon.core.workflows.traffic_runs import found_runs, read_runs
 
 

@@ -6,8 +6,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from seip_addon.core.errors import SeipError
-from seip_addon.core.progress import Progress, finish
+from seip_addon.core.base.errors import SeipError
+from seip_addon.core.base.progress import Progress, finish
 from seip_addon.core.sensing.traffic.trajectories import Trajectories
 from seip_addon.core.workflows import traffic_simulation
 from seip_addon.core.workflows.traffic_simulation import SIMULATION, SimulationSettings, simulate_runs

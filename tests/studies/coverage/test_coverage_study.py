@@ -12,7 +12,7 @@ from headless.studies.coverage.tables import save_study_table
 import numpy as np
 import pytest
 
-from seip_addon.core.progress import finish
+from seip_addon.core.base.progress import finish
 from seip_addon.core.site.site import Site
 from tests.builders.small_junction import make_example
 

@@ -15,7 +15,7 @@ from headless.studies.criteria.criteria_table import difference_of, in_halves
 
 import numpy as np
 
-from seip_addon.core.estimates import student_quantile
+from seip_addon.core.base.estimates import student_quantile
 from tests.builders.labelled_frames import box, detected, frame, truth
 
 OPTIONS = ["--sensor", "type1", "--count", "1", "2", "--placements", "4", "--every", "30", "--effort", "1"]

@@ -12,8 +12,8 @@ from headless.studies.criteria.site_criteria import best_of, problem_of
 
 import numpy as np
 
+from seip_addon.core.base.progress import finish
 from seip_addon.core.choosing.placement.search_limits import DEFAULT_LIMITS
-from seip_addon.core.progress import finish
 from tests.builders.small_junction import make_example
 
 

@@ -17,8 +17,8 @@ from headless.studies.criteria.vehicle_grid import VIEW_CELLS
 
 import numpy as np
 
+from seip_addon.core.base.progress import finish
 from seip_addon.core.choosing.placement.problem import PlacementProblem
-from seip_addon.core.progress import finish
 
 
 def poses(*chosen):

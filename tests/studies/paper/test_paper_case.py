@@ -11,9 +11,9 @@ from headless.studies.paper import command as paper_case
 
 from matplotlib.image import imread
 
-from seip_addon.core.errors import SeipError
-from seip_addon.core.progress import finish
-from seip_addon.core.sumo_programs import find_sumo
+from seip_addon.core.base.errors import SeipError
+from seip_addon.core.base.progress import finish
+from seip_addon.core.programs.sumo_programs import find_sumo
 from seip_addon.core.world.traffic_simulation.simulation import SignalPlan, _network
 from seip_addon.core.world.traffic_simulation.street_network import read_network
 from tests.sumo_here import needs_sumo

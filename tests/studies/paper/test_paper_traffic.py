@@ -8,9 +8,9 @@ from headless.studies.paper.traffic_runs import (
     read_demand_of_site,
 )
 
-from seip_addon.core.progress import finish
+from seip_addon.core.base.progress import finish
+from seip_addon.core.programs.sumo_programs import find_sumo, run
 from seip_addon.core.sensing.traffic.trajectories import Trajectories
-from seip_addon.core.sumo_programs import find_sumo, run
 from seip_addon.core.workflows.traffic_runs import runs_in
 from tests.builders.plain_street import street
 from tests.sumo_here import needs_sumo

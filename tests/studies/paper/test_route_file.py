@@ -8,8 +8,8 @@ from headless.studies.paper.route_file import read_demand, write_run
 import numpy as np
 import pytest
 
-from seip_addon.core.errors import SeipError
-from seip_addon.core.progress import finish
+from seip_addon.core.base.errors import SeipError
+from seip_addon.core.base.progress import finish
 from seip_addon.core.sensing.traffic.vehicle_types import read_vehicle_types
 
 TYPES = """<routes>

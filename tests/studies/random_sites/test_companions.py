@@ -7,7 +7,7 @@ from headless.studies.random_sites.companions import with_companions
 import numpy as np
 import pytest
 
-from seip_addon.core.progress import finish
+from seip_addon.core.base.progress import finish
 from seip_addon.core.sensing.traffic.overlaps import find_overlaps
 from seip_addon.core.sensing.traffic.trajectories import Trajectories
 

@@ -4,7 +4,7 @@ from xml.etree import ElementTree as ET
 
 from headless.studies.random_sites.demand_draw import DrawnDemand
 
-from seip_addon.core.progress import finish
+from seip_addon.core.base.progress import finish
 from seip_addon.core.sensing.traffic.vehicle_types import read_vehicle_types
 from seip_addon.core.world.traffic_simulation.demand import Demand, write_routes
 from tests.builders.street_network import three_ways

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import shapely
 
-from seip_addon.core.progress import finish
+from seip_addon.core.base.progress import finish
 from seip_addon.core.sensing.traffic.run_overlap import MAX_OVERLAP, overlap_of, vehicle_positions
 from seip_addon.core.sensing.traffic.trajectories import Trajectories
 from seip_addon.core.world.elevation.geotiff import read_geotiff

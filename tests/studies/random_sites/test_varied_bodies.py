@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import shapely
 
-from seip_addon.core.progress import finish
+from seip_addon.core.base.progress import finish
 from seip_addon.core.sensing.traffic.trajectories import CATEGORIES, RoadUser, Trajectories
 from tests.builders.traffic_by_hand import make_trajectories
 

@@ -18,7 +18,7 @@ from headless.studies.site_training.field_conditions import (
 import numpy as np
 import pytest
 
-from seip_addon.core.progress import finish
+from seip_addon.core.base.progress import finish
 from seip_addon.core.sensing.scans.frame import STATIC_INSTANCE
 from seip_addon.core.sensing.scans.simulation import ScanSettings, prepare
 from seip_addon.core.sensing.scans.static_scene import static_scene

@@ -15,7 +15,7 @@ from headless.studies.site_training.command import HEIGHTS, MAX_SENSORS, TILTS, 
 
 import numpy as np
 
-from seip_addon.core.errors import SeipError
+from seip_addon.core.base.errors import SeipError
 from seip_addon.core.sensing.lidar.catalogue import load_catalogue
 from tests.builders.small_junction import make_example
 

@@ -11,7 +11,7 @@ from headless.studies.stability.criterion import criterion_rows, criterion_study
 import numpy as np
 import pytest
 
-from seip_addon.core.progress import finish
+from seip_addon.core.base.progress import finish
 from seip_addon.core.sensing.lidar.catalogue import load_catalogue
 from seip_addon.core.sensing.visibility.ray_casting import make_ray_caster
 from seip_addon.core.sensing.visibility.ring_resolution import unresolved_from

@@ -11,7 +11,7 @@ from headless.studies.stability.weather import WeatherAnswer, weather_rows, weat
 import bpy
 import pytest
 
-from seip_addon.core.progress import finish
+from seip_addon.core.base.progress import finish
 from seip_addon.core.sensing.visibility.grid import compute_visibility
 from seip_addon.core.sensing.weather import weather_of
 from seip_addon.core.site.candidates import CandidateSettings

@@ -16,8 +16,8 @@ from dataclasses import dataclass
 import numpy as np
 import pulp
 
-from ...arrays import Float
-from ...errors import SeipError
+from ...base.arrays import Float
+from ...base.errors import SeipError
 from ..placement.integer_program import solver_name
 from ..placement.problem import TIE_TOLERANCE
 from .frontier import Options

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...arrays import Float, Integer
+from ...base.arrays import Float, Integer
 from ..placement.problem import TIE_TOLERANCE
 
 MOST_AMOUNTS = 400

@@ -10,8 +10,8 @@ from typing import TypeVar
 
 import numpy as np
 
-from ...arrays import Float
-from ...progress import Progress, in_thread
+from ...base.arrays import Float
+from ...base.progress import Progress, in_thread
 from ..placement.concave import relative_gap
 from ..placement.problem import TIE_TOLERANCE
 from .allocation import Allocation, allocate, allocation_of, relaxed_allocation

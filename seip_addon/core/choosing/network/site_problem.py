@@ -11,9 +11,9 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ...arrays import Boolean, Float, Integer, Text
-from ...errors import SeipError
-from ...progress import Progress
+from ...base.arrays import Boolean, Float, Integer, Text
+from ...base.errors import SeipError
+from ...base.progress import Progress
 from ...storage.array_file import ArrayFile
 from ..placement.cheapest import cheapest_for_share
 from ..placement.concave import COVERAGE, LOG_RETURNS

@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...arrays import Boolean, Float, Integer
+from ...base.arrays import Boolean, Float, Integer
 from .concave import ConcaveSum
 from .instance import Instance
 from .problem import TIE_TOLERANCE

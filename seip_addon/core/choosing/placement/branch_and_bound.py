@@ -19,8 +19,8 @@ from heapq import heapify, heappop, heappush
 import numpy as np
 from numpy.typing import NDArray
 
-from ...arrays import Boolean, Float, Integer
-from ...progress import Progress
+from ...base.arrays import Boolean, Float, Integer
+from ...base.progress import Progress
 from .bounds import Bound, Composition, Rest, bound_at, compositions, falling_bounds, rest_of
 from .concave import ConcaveSum, StepSum
 from .incumbent import Incumbent

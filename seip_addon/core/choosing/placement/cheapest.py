@@ -8,9 +8,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...arrays import Float, Integer
-from ...errors import SeipError
-from ...progress import Progress
+from ...base.arrays import Float, Integer
+from ...base.errors import SeipError
+from ...base.progress import Progress
 from .bounds import bound_at, falling_bounds, rest_of
 from .feasibility import serving_choice, starting_choice
 from .incumbent import Incumbent

@@ -34,7 +34,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from ...arrays import Float, Integer
+from ...base.arrays import Float, Integer
 
 ROWS_AT_ONCE = 16  # rows that stay in a processor's cache
 SINGLE_ROUNDING = 1e-5  # share of a sum of single-precision products by which it may be wrong

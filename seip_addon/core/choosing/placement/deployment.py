@@ -6,7 +6,7 @@ from itertools import combinations
 
 import numpy as np
 
-from ...arrays import Boolean, Float, Integer
+from ...base.arrays import Boolean, Float, Integer
 from ...geometry.orientation import describe_turn, orientation
 from ...sensing.lidar.model import LidarModel
 from ...sensing.scans.sensor import MountedSensor

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...arrays import Integer
-from ...errors import SeipError
-from ...progress import Progress
+from ...base.arrays import Integer
+from ...base.errors import SeipError
+from ...base.progress import Progress
 from .instance import Instance
 from .integer_program import PlacementProgram
 from .problem import PlacementProblem

@@ -7,8 +7,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ...arrays import Integer
-from ...progress import Progress
+from ...base.arrays import Integer
+from ...base.progress import Progress
 from .instance import Instance
 from .search_limits import Work
 

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...arrays import Boolean, Float, Integer
-from ...errors import SeipError
+from ...base.arrays import Boolean, Float, Integer
+from ...base.errors import SeipError
 from .concave import ConcaveSum, Steps
 from .problem import TIE_TOLERANCE, PlacementProblem, canonical_order
 from .risk import NOMINAL, Risk

@@ -28,9 +28,9 @@ import numpy as np
 import pulp
 from pulp.apis.coin_api import pulp_cbc_path
 
-from ...arrays import Boolean, Float, Integer
-from ...errors import SeipError
-from ...progress import Progress, in_thread
+from ...base.arrays import Boolean, Float, Integer
+from ...base.errors import SeipError
+from ...base.progress import Progress, in_thread
 from .incumbent import Incumbent
 from .instance import Instance
 from .problem import TIE_TOLERANCE

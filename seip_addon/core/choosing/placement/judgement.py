@@ -3,8 +3,8 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from ...counts import counted
-from ...estimates import Interval
+from ...base.counts import counted
+from ...base.estimates import Interval
 
 DEFAULT_FINALISTS = 12
 MEAN = "mean"

@@ -9,11 +9,11 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import SeipError
-from ...limits import CHOSEN_WEIGHT, DISTANCE, PRICE, SENSORS
+from ...base.errors import SeipError
+from ...base.limits import CHOSEN_WEIGHT, DISTANCE, PRICE, SENSORS
+from ...base.settings import setting
 from ...sensing.lidar.carla_dropoff import CarlaDropoff
 from ...sensing.lidar.model import LidarModel
-from ...settings import setting
 from ...site.site import Candidates, Site
 from ..robustness.comparison import Comparison
 from .deployment import BAND, UNRANKED, Deployment, pose_prices

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...arrays import Boolean, Float, Integer, Text
-from ...errors import SeipError
+from ...base.arrays import Boolean, Float, Integer, Text
+from ...base.errors import SeipError
 from .concave import COVERAGE, Concave
 
 TIE_TOLERANCE = 1e-9  # share of all weight, or of the price, below which differences count as rounding

@@ -22,8 +22,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ...arrays import Float, Integer
-from ...errors import SeipError
+from ...base.arrays import Float, Integer
+from ...base.errors import SeipError
 
 Failure = Literal["none", "worst", "mean"]
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from ...errors import SeipError
-from ...limits import DRAWS, SCENARIOS
+from ...base.errors import SeipError
+from ...base.limits import DRAWS, SCENARIOS
+from ...base.settings import setting
 from ...sensing.scenarios.pose_errors import PoseErrors
-from ...settings import setting
 
 ScenarioKind = Literal["nominal", "pose-errors", "traffic"]
 

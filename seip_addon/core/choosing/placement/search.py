@@ -11,8 +11,8 @@ from collections.abc import Generator
 
 import numpy as np
 
-from ...arrays import Float, Integer
-from ...progress import Progress
+from ...base.arrays import Float, Integer
+from ...base.progress import Progress
 from .incumbent import Incumbent
 from .problem import TIE_TOLERANCE
 from .search_limits import OVERHEAD_OPERATIONS

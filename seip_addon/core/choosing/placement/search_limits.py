@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
-from ...acceptance import Acceptance
-from ...errors import SeipError
+from ...base.acceptance import Acceptance
+from ...base.errors import SeipError
 
 OPERATIONS_PER_UNIT = 2.5e9  # multiplications that make a unit of work: about a second of one processor core
 OVERHEAD_OPERATIONS = 6e5  # multiplications that take as long as what goes on around each counted step

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...arrays import Float, Integer
-from ...counts import counted
-from ...errors import SeipError
-from ...progress import Progress, finish, within
+from ...base.arrays import Float, Integer
+from ...base.counts import counted
+from ...base.errors import SeipError
+from ...base.progress import Progress, finish, within
 from .branch_and_bound import BranchAndBound, GainSearch
 from .concave import Steps, StepSum
 from .feasibility import starting_choice

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...arrays import Boolean, Float
-from ...estimates import IntervalEstimate, mean_of, mean_over_time, quantile_gain, quantile_of
+from ...base.arrays import Boolean, Float
+from ...base.estimates import IntervalEstimate, mean_of, mean_over_time, quantile_gain, quantile_of
 from ...sensing.scenarios.traffic_instants import Instants
 from ..placement.problem import Placement
 from ..placement.risk import Risk

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...progress import Progress
+from ...base.progress import Progress
 from ...sensing.lidar.model import LidarModel
 from ...sensing.visibility.surroundings import Surroundings
 from ...sensing.visibility.visibility_model import visibility_model

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...arrays import Float
-from ...estimates import IntervalEstimate, mean_of, quantile_of
-from ...progress import Progress
+from ...base.arrays import Float
+from ...base.estimates import IntervalEstimate, mean_of, quantile_of
+from ...base.progress import Progress
 from ...sensing.scenarios.pose_errors import ERROR_KINDS, PoseErrors
 from ...sensing.scenarios.visibility_under_errors import visibility_under_errors
 from ...sensing.visibility.surroundings import Surroundings

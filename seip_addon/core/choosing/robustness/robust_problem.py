@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...arrays import Float, Integer
-from ...progress import Progress
+from ...base.arrays import Float, Integer
+from ...base.progress import Progress
 from ...sensing.scenarios.scenario_visibility import ScenarioVisibility
 from ...sensing.scenarios.traffic_instants import Instants, spread_instants
 from ...sensing.scenarios.visibility_in_traffic import visibility_in_traffic

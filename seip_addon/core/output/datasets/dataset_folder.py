@@ -8,8 +8,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any, Literal
 
-from ...errors import SeipError
-from ...progress import Progress
+from ...base.errors import SeipError
+from ...base.progress import Progress
 from ...sensing.scans.frame import Frame
 from ...storage.files import digest, parse_json, save_json, whole_file
 from ...storage.json_dataclass import from_json

@@ -23,8 +23,8 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from ...arrays import Float
-from ...errors import SeipError
+from ...base.arrays import Float
+from ...base.errors import SeipError
 from ...geometry.orientation import quaternion_of
 from .sample import Sample, TrafficRun, cloud, shortest
 

@@ -12,8 +12,8 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from ...arrays import Float
-from ...counts import round_number
+from ...base.arrays import Float
+from ...base.counts import round_number
 from ...geometry.tangent_plane import plan_metres
 from ..pictures.chart_style import add_legend, new_figure, plain_legend, set_title, style_axes
 from ..pictures.drawing import (

@@ -8,8 +8,8 @@ from urllib.parse import quote
 
 import numpy as np
 
-from ...arrays import Integer
-from ...counts import counted, round_number
+from ...base.arrays import Integer
+from ...base.counts import counted, round_number
 from ..pictures.drawing import percent
 from ..pictures.palette import INK, PAPER, PAPER_STREETS, SHARE_COLOURS, SOFT_INK
 from ..report.html import page

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
-from ...counts import counted
+from ...base.counts import counted
 from ...storage.csv_table import save_csv
 from ...storage.files import save_json, whole_file
 from ..pictures.drawing import percent

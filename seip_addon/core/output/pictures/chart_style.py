@@ -9,7 +9,7 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ...estimates import IntervalEstimate
+from ...base.estimates import IntervalEstimate
 from .drawing import Window, new_page, save_png, window_around
 from .palette import INK, SERIES_COLOURS, SOFT_INK
 

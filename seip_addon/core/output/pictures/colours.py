@@ -13,13 +13,13 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ...arrays import Float, Integer
+from ...base.arrays import Float, Integer
+from ...base.errors import SeipError
 from ...choosing.placement.deployment import Deployment
 from ...choosing.placement.returns_summary import FEW_RETURNS
-from ...errors import SeipError
 from ...sensing.scans.frame import STATIC_INSTANCE, Frame
-from ..pictures.palette import COMPARED_COLOURS
 from .palette import (
+    COMPARED_COLOURS,
     INTENSITY_COLOURS,
     MAX_INTENSITY,
     RETURNS_COLOURS,

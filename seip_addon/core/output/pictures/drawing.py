@@ -18,9 +18,9 @@ from matplotlib.ft2font import FT2Font, LoadFlags
 from matplotlib.patches import Rectangle
 from PIL import Image
 
-from ...arrays import Boolean, Float
+from ...base.arrays import Boolean, Float
+from ...base.counts import counted, round_number
 from ...choosing.placement.deployment import Deployment, price_text
-from ...counts import counted, round_number
 from ...site.site import Site
 from ...storage.files import whole_file
 from .labels import place_callouts

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...arrays import Boolean, Float
+from ...base.arrays import Boolean, Float
 from ...geometry.map_view import MapView
 from ...world.street_plan import NamePlaces
 

@@ -14,7 +14,7 @@ from matplotlib.patches import PathPatch, Wedge
 from matplotlib.path import Path
 from shapely.geometry.base import BaseGeometry
 
-from ...arrays import Float
+from ...base.arrays import Float
 from ...choosing.placement.deployment import Deployment
 from ...geometry.plan import closed, outline
 from ...site.scene_geometry import ASSUMED, OTHER_LEVELS, Mesh, SceneGeometry

@@ -13,8 +13,8 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from shapely.geometry.base import BaseGeometry
 
+from ...base.counts import counted
 from ...choosing.placement.deployment import Deployment
-from ...counts import counted
 from ...site.scene_geometry import ASSUMED, FROM_MAP, OTHER_LEVELS, NamedArea, SceneGeometry
 from ...site.site import Site
 from .colours import of_placement

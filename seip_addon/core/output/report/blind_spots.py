@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 
-from ...arrays import Boolean, Float, Integer
+from ...base.arrays import Boolean, Float, Integer
 from ...site.locations import DIRECTIONS, direction
 from ...site.targets import Targets
 from ..results.site_file import PLACE, WEIGHTED, Area

@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from ...arrays import Boolean, Integer
-from ...errors import SeipError
+from ...base.arrays import Boolean, Integer
+from ...base.errors import SeipError
 from ...geometry.geo_reference import GeoReference
 from ..pictures.close_ups import close_ups
 from ..results.file_names import (

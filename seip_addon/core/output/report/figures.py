@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from matplotlib.colors import ListedColormap
 
-from ...arrays import Float
+from ...base.arrays import Float
 from ..pictures.chart_style import new_figure, style_axes
 from ..pictures.drawing import (
     Style,

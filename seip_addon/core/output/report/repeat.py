@@ -7,10 +7,10 @@ import shlex
 from collections.abc import Iterator
 from dataclasses import fields
 
+from ...base.settings import settings_of
 from ...choosing.placement.objective import Objective
 from ...sensing.scenarios.pose_errors import PoseErrors
 from ...sensing.visibility.settings import VisibilitySettings
-from ...settings import settings_of
 from ...site.candidates import CandidateSettings
 from ...site.installed_cost import load_installed_cost
 from ...storage.json_dataclass import as_json

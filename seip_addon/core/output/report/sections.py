@@ -9,7 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
-from ...arrays import Boolean, Float
+from ...base.arrays import Boolean, Float
+from ...base.counts import counted
+from ...base.progress import Progress
 from ...choosing.placement.deployment import BAND, UNRANKED
 from ...choosing.placement.objective import CHOSEN_FOR, MOVED, SAME_PRICE, purpose
 from ...choosing.placement.returns_summary import (
@@ -19,8 +21,6 @@ from ...choosing.placement.returns_summary import (
     SURFACE_SEEN,
     returns_text,
 )
-from ...counts import counted
-from ...progress import Progress
 from ...site.candidates import PAPER_TYPES
 from ..pictures.drawing import percent
 from ..results.answer import Costs, costs_of, sentence

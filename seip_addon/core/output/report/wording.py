@@ -7,8 +7,8 @@ import re
 from collections.abc import Mapping
 from datetime import datetime
 
+from ...base.counts import counted
 from ...choosing.placement.objective import CHOSEN_FOR, MOVED, MOVED_MESSAGE, Objective
-from ...counts import counted
 from ...sensing.lidar.catalogue import load_catalogue
 from ..results.answer import possible_improvement, sentence
 from ..results.placement_record import RecordedSensor

@@ -7,9 +7,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 
+from ...base.counts import counted
 from ...choosing.placement.objective import ACCEPTED_MESSAGE, MOVED, purpose
 from ...choosing.placement.returns_summary import FEW_RETURNS, returns_text, share_reached
-from ...counts import counted
 from ...site.installed_cost import InstalledCost, load_installed_cost
 from .placement_record import PlacementRecord
 

@@ -15,7 +15,7 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from ...arrays import Boolean, Float
+from ...base.arrays import Boolean, Float
 from ...choosing.placement.deployment import Deployment, Sensor
 from ...geometry.orientation import degrees, tilt_degrees
 from ...geometry.plan import closed

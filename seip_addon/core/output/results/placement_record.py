@@ -15,14 +15,14 @@ from typing import Any, Literal, TypeVar, cast
 
 import numpy as np
 
-from ...arrays import Float, Integer
+from ...base.arrays import Float, Integer
+from ...base.errors import SeipError
 from ...choosing.placement.deployment import GainBand, Sensor, price_text
 from ...choosing.placement.judgement import Judgement
 from ...choosing.placement.objective import FrontPoint, Objective, Solution
 from ...choosing.placement.problem import Placement
 from ...choosing.placement.returns_summary import CrossingReturns, ReturnsSummary, share_reached
 from ...choosing.placement.search_limits import DEFAULT_EFFORT
-from ...errors import SeipError
 from ...geometry.geo_reference import GeoReference
 from ...geometry.orientation import degrees, orientation, tilt_degrees
 from ...sensing.lidar.model import LidarModel

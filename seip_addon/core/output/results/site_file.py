@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 
-from ...arrays import Boolean
+from ...base.arrays import Boolean
 from ...choosing.placement.objective import Solution
 from ...choosing.placement.problem import PlacementConstraints
 from ...site.scene_geometry import SceneGeometry

@@ -9,7 +9,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Literal
 
-from ...counts import counted
+from ...base.counts import counted
 from ...sensing.recordings.figures import CoverageSteps
 from ...sensing.recordings.verification import InstalledSensor
 from ...site.locations import direction

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from ...arrays import Boolean, Float, Integer
+from ...base.arrays import Boolean, Float, Integer
 
 
 def steps_in_arcs(

@@ -6,7 +6,7 @@ import functools
 
 import numpy as np
 
-from ...arrays import Float, Integer
+from ...base.arrays import Float, Integer
 from .model import LidarModel
 
 

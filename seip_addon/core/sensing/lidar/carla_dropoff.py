@@ -8,9 +8,9 @@ from typing import ClassVar
 
 import numpy as np
 
-from ...arrays import Float
-from ...errors import SeipError
-from ...limits import ATTENUATION, POSITIVE_SHARE, SHARE, Limits
+from ...base.arrays import Float
+from ...base.errors import SeipError
+from ...base.limits import ATTENUATION, POSITIVE_SHARE, SHARE, Limits
 
 
 @dataclass(frozen=True)

@@ -14,8 +14,8 @@ from typing import Any, TypeGuard
 
 import numpy as np
 
-from ...errors import SeipError
-from ...limits import ACCUMULATION, CHANNELS, GAIN
+from ...base.errors import SeipError
+from ...base.limits import ACCUMULATION, CHANNELS, GAIN
 from ...storage.toml_table import Key, number, parse_toml, read_table, toml_text
 from .carla_dropoff import CarlaDropoff
 from .model import DetectionLaw, LidarModel
@@ -77,7 +77,7 @@ def load_catalogue(extra: Iterable[str | os.PathLike[str]] = ()) -> dict[str, Li
     >>> find_models(load_catalogue(), ["os1_218"])
     Traceback (most recent call last):
     ...
-    seip_addon.core.errors.SeipError: no LiDAR 'os1_218' in the catalogue; did you mean os1_128, os2_128, os0_128?
+    seip_addon.core.base.errors.SeipError: no LiDAR 'os1_218' in the catalogue; did you mean os1_128, os2_128, os0_128?
     """
     catalogue = dict(_shipped())
     for path in map(Path, extra):

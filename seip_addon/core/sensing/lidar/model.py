@@ -9,10 +9,10 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ... import limits
-from ...arrays import Boolean, Float, Integer
-from ...errors import SeipError
-from ...limits import Limits
+from ...base import limits
+from ...base.arrays import Boolean, Float, Integer
+from ...base.errors import SeipError
+from ...base.limits import Limits
 from .carla_dropoff import CarlaDropoff
 from .range_equation import RangeEquation
 from .rosette import Rosette

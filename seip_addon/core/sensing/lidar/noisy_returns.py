@@ -7,7 +7,7 @@ import functools
 import numpy as np
 from numpy.typing import NDArray
 
-from ...arrays import Float, Integer
+from ...base.arrays import Float, Integer
 from .model import LidarModel
 
 

@@ -28,9 +28,9 @@ from typing import ClassVar
 
 import numpy as np
 
-from ...arrays import Float
-from ...errors import SeipError
-from ...limits import DETECTION_RANGE, DETECTION_SPREAD, DETECTION_THRESHOLD, EXTINCTION, POSITIVE_SHARE, Limits
+from ...base.arrays import Float
+from ...base.errors import SeipError
+from ...base.limits import DETECTION_RANGE, DETECTION_SPREAD, DETECTION_THRESHOLD, EXTINCTION, POSITIVE_SHARE, Limits
 from .carla_dropoff import CarlaDropoff
 
 CEILING = 0.985

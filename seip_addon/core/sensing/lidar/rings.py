@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...arrays import Boolean, Float
+from ...base.arrays import Boolean, Float
 from .beams import BeamPattern
 from .model import LidarModel
 

@@ -26,9 +26,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...arrays import Float
-from ...errors import SeipError
-from ...limits import PRISM_RATE, PRISM_WEDGE, REFRACTIVE_INDEX, TIME, Limits
+from ...base.arrays import Float
+from ...base.errors import SeipError
+from ...base.limits import PRISM_RATE, PRISM_WEDGE, REFRACTIVE_INDEX, TIME, Limits
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from ...arrays import Float, Integer
+from ...base.arrays import Float, Integer
 
 
 def sector_of(directions: Float, sectors: int) -> Integer:

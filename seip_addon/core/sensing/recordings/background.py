@@ -13,10 +13,10 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ...arrays import Boolean, Float
-from ...counts import counted
-from ...errors import SeipError
-from ...progress import Progress
+from ...base.arrays import Boolean, Float
+from ...base.counts import counted
+from ...base.errors import SeipError
+from ...base.progress import Progress
 from ..lidar.model import LidarModel
 from .ray_grid import RayGrid, recovered_rays
 from .sensor_recording import SensorRecording

@@ -12,10 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from ...arrays import Float, Text
-from ...errors import SeipError
+from ...base.arrays import Float, Text
+from ...base.errors import SeipError
+from ...base.limits import ROAD_USER_SIZE, SENSOR_COORDINATE, UNWRAPPED_ANGLE, Limits
 from ...geometry.orientation import quaternion_rotation
-from ...limits import ROAD_USER_SIZE, SENSOR_COORDINATE, UNWRAPPED_ANGLE, Limits
 from ...storage.array_file import READ_ERRORS
 from ...storage.files import content_fault, parse_json, read_small
 from ..traffic.trajectories import CATEGORIES

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 
-from ...arrays import Boolean, Float, Integer
+from ...base.arrays import Boolean, Float, Integer
 from ...site.scene_geometry import Mesh
 from ..scans.scanner import ReflectiveSurface
 from ..scans.sensor import MountedSensor

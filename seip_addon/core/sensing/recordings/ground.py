@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
-from ...arrays import Boolean, Float, Integer
-from ...errors import SeipError
+from ...base.arrays import Boolean, Float, Integer
+from ...base.errors import SeipError
 from ...geometry.height_raster import HeightRaster
 
 _STEP = 1.0  # metres between heights

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from ...arrays import Float
-from ...errors import SeipError
+from ...base.arrays import Float
+from ...base.errors import SeipError
 from ...storage.files import parse_json, read_small
 from .sensor_recording import SensorRecording
 from .sweep import Sweep, sweep_of

@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...arrays import Float
+from ...base.arrays import Float
+from ...base.limits import MAP_COORDINATE, SWEEP_POINTS
 from ...geometry.orientation import quaternion_rotation
-from ...limits import MAP_COORDINATE, SWEEP_POINTS
 
 _MAX_HEADER_BYTES = 1 << 16
 _MAX_POINT_BYTES = 1 << 12

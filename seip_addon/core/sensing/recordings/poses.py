@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from ...arrays import Float
-from ...errors import SeipError
+from ...base.arrays import Float
+from ...base.errors import SeipError
+from ...base.limits import LOCAL_COORDINATE
 from ...geometry.orientation import nearest_rotation
-from ...limits import LOCAL_COORDINATE
 from ...storage.array_file import READ_ERRORS
 from ...storage.files import content_fault, parse_json, read_small
 

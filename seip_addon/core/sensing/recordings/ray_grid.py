@@ -14,8 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ...arrays import Float, Integer
-from ...errors import SeipError
+from ...base.arrays import Float, Integer
+from ...base.errors import SeipError
 from ..lidar.model import LidarModel
 
 _BIN = math.radians(0.01)  # width of a bin of the histogram of elevations

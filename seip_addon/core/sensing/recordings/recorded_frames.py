@@ -11,11 +11,11 @@ import shapely
 from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
-from ...arrays import Boolean, Float
-from ...errors import SeipError
+from ...base.arrays import Boolean, Float
+from ...base.errors import SeipError
+from ...base.progress import Progress
 from ...geometry.height_raster import HeightRaster
 from ...geometry.orientation import rotated
-from ...progress import Progress
 from ..lidar.model import LidarModel
 from ..scans.frame import STATIC_INSTANCE, Frame, Labels
 from ..scans.scanner import ReflectiveSurface

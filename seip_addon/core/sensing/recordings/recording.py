@@ -10,9 +10,9 @@ from pathlib import Path
 
 import numpy as np
 
-from ...arrays import Float, Integer
-from ...errors import SeipError
-from ...limits import FRAMES, ROTATION_RATE, TIME
+from ...base.arrays import Float, Integer
+from ...base.errors import SeipError
+from ...base.limits import FRAMES, ROTATION_RATE, TIME
 from ...storage.files import natural_order, read_small
 from .ouster_file import open_ouster
 from .sensor_recording import SensorRecording

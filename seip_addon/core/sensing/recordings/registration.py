@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...arrays import Boolean, Float, Integer
-from ...errors import SeipError
-from ...estimates import student_quantile
+from ...base.arrays import Boolean, Float, Integer
+from ...base.errors import SeipError
+from ...base.estimates import student_quantile
 from ...geometry.orientation import nearest_rotation
 from ..scans.scanner import ReflectiveSurface
 from ..scans.sensor import MountedSensor

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from ...arrays import Float
+from ...base.arrays import Float
 from .sweep import Sweep
 from .sweep_files import read_sweep
 

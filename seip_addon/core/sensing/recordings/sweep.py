@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...arrays import Float
-from ...errors import SeipError
+from ...base.arrays import Float
+from ...base.errors import SeipError
+from ...base.limits import MAP_NUMBER, SENSOR_COORDINATE, SWEEP_POINTS, TIME
 from ...geometry.orientation import rotated
-from ...limits import MAP_NUMBER, SENSOR_COORDINATE, SWEEP_POINTS, TIME
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...arrays import Float
-from ...errors import SeipError
+from ...base.arrays import Float
+from ...base.errors import SeipError
 from ...storage.array_file import read_npz
 from ...storage.files import read_small
 from .pcd_file import read_pcd

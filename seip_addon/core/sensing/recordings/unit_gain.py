@@ -8,8 +8,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from ...arrays import Boolean, Float, Integer
-from ...estimates import student_quantile
+from ...base.arrays import Boolean, Float, Integer
+from ...base.estimates import student_quantile
 from ..lidar.carla_dropoff import CarlaDropoff
 from ..lidar.noisy_returns import return_chance
 from .azimuth_sectors import sector_of

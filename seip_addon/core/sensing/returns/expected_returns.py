@@ -25,7 +25,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...arrays import Boolean, Float, Integer, concatenated_ranges
+from ...base.arrays import Boolean, Float, Integer, concatenated_ranges
 from ..lidar.beams import BeamPattern
 from ..lidar.model import LidarModel
 from ..visibility.ray_casting import RayCaster

@@ -23,7 +23,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ...arrays import Float
+from ...base.arrays import Float
 from .bodies import PANELS
 from .road_users import BODIES, RoadUsers
 

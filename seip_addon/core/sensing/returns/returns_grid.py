@@ -11,9 +11,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ...arrays import Integer
-from ...errors import SeipError
-from ...progress import Progress
+from ...base.arrays import Integer
+from ...base.errors import SeipError
+from ...base.progress import Progress
 from ...site.site import Site
 from ...storage.array_file import ArrayFile
 from ...storage.files import digest

@@ -10,7 +10,7 @@ import shapely
 from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
-from ...arrays import Boolean, Float, Integer
+from ...base.arrays import Boolean, Float, Integer
 from ...geometry.plan import outline, surface_height
 from ...site.scene_geometry import NamedArea, SceneGeometry, joined
 from ...site.targets import generate_targets

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from ...arrays import Float, Integer, concatenated_ranges
+from ...base.arrays import Float, Integer, concatenated_ranges
 from ..lidar.azimuth_steps import steps_in_arcs
 from ..lidar.model import LidarModel
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
-from ...arrays import Boolean, Float, Integer, Text
+from ...base.arrays import Boolean, Float, Integer, Text
 from ...storage.array_file import ArrayFile
 
 _POINTS = {

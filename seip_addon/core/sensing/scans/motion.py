@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...arrays import Float
+from ...base.arrays import Float
 from ...geometry.orientation import rotations
 from ..traffic.trajectories import Snapshot, Trajectories
 

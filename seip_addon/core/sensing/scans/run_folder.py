@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from ...arrays import Float
-from ...errors import SeipError
-from ...progress import Progress
+from ...base.arrays import Float
+from ...base.errors import SeipError
+from ...base.progress import Progress
 from ...storage.files import digest, parse_json, save_json
 from ...storage.folder_contents import MANIFEST, check_no_placement
 from ...storage.json_dataclass import from_json

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ...arrays import Boolean, Float, Integer
+from ...base.arrays import Boolean, Float, Integer
 from ..lidar.beams import BeamPattern
 from ..lidar.noisy_returns import return_chance
 from ..visibility.ray_casting import RayCaster

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...arrays import Float
-from ...errors import SeipError
+from ...base.arrays import Float
+from ...base.errors import SeipError
 from ..lidar.model import LidarModel
 
 _ORTHONORMAL_TOLERANCE = 1e-6

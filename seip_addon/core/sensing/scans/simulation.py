@@ -14,12 +14,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...arrays import Float, Integer
-from ...errors import SeipError
+from ...base.arrays import Float, Integer
+from ...base.errors import SeipError
+from ...base.limits import FRAMES
+from ...base.progress import Progress
+from ...base.settings import setting
 from ...geometry.orientation import rotations
-from ...limits import FRAMES
-from ...progress import Progress
-from ...settings import setting
 from ..lidar.noisy_returns import measured_returns
 from ..traffic.bodies import Body
 from ..traffic.trajectories import Snapshot, Trajectories

@@ -9,7 +9,7 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from ...arrays import Boolean, Float
+from ...base.arrays import Boolean, Float
 from ...site.far_objects import without_far_objects
 from ...site.scene_geometry import SceneGeometry, ordered_surfaces
 from .sensor import MountedSensor

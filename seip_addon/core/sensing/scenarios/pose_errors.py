@@ -19,9 +19,9 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from ...arrays import Float
-from ...errors import SeipError
-from ...settings import setting
+from ...base.arrays import Float
+from ...base.errors import SeipError
+from ...base.settings import setting
 from ...site.obstruction import inside_any
 from ...site.scene_geometry import Mesh
 

@@ -10,8 +10,8 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ...arrays import Boolean, Integer
-from ...progress import Progress
+from ...base.arrays import Boolean, Integer
+from ...base.progress import Progress
 
 T = TypeVar("T")
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...arrays import Float, Integer
-from ...errors import SeipError
+from ...base.arrays import Float, Integer
+from ...base.errors import SeipError
 from ...geometry.orientation import rotations
 from ..traffic.bodies import fitted_body
 from ..traffic.trajectories import WARM_UP, Snapshot, Trajectories

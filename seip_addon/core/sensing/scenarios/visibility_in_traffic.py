@@ -15,8 +15,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...arrays import Boolean, Float, Integer, concatenated_ranges
-from ...progress import Progress
+from ...base.arrays import Boolean, Float, Integer, concatenated_ranges
+from ...base.progress import Progress
 from ..lidar.beams import BeamPattern
 from ..scans.beam_culling import BeamWindows
 from ..scans.sensor import level_orientation

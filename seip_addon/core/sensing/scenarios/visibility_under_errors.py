@@ -4,9 +4,9 @@ from collections.abc import Generator
 
 import numpy as np
 
-from ...arrays import Integer
+from ...base.arrays import Integer
+from ...base.progress import Progress
 from ...geometry.orientation import orientations
-from ...progress import Progress
 from ..visibility.chunks import sharing_rays
 from ..visibility.ray_casting import engine_name, make_ray_caster
 from ..visibility.surroundings import Surroundings

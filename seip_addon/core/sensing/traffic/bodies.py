@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ...arrays import Float, Text
-from ...errors import SeipError
+from ...base.arrays import Float, Text
+from ...base.errors import SeipError
 from .trajectories import CATEGORIES, RoadUser, bent
 
 MESHES = Path(__file__).parent / "body_meshes"

@@ -17,11 +17,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...arrays import Boolean, Float, Integer
-from ...counts import counted
-from ...errors import SeipError
-from ...limits import LATITUDE, LONGITUDE, MAP_COORDINATE, SPEED, TIME
-from ...progress import Progress
+from ...base.arrays import Boolean, Float, Integer
+from ...base.counts import counted
+from ...base.errors import SeipError
+from ...base.limits import LATITUDE, LONGITUDE, MAP_COORDINATE, SPEED, TIME
+from ...base.progress import Progress
 from ...storage.files import digest
 from ...storage.xml_stream import Attributes, opened, quoted, read_tags, short
 from .trajectories import RoadUser, Trajectories

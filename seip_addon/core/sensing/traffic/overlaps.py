@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 
-from ...arrays import Float, Integer
-from ...progress import Progress
+from ...base.arrays import Float, Integer
+from ...base.progress import Progress
 from .trajectories import Snapshot, Trajectories, some_users
 
 MIN_OVERLAP = 0.02  # square metres; smaller overlaps of two footprints are only contact

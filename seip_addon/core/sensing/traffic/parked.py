@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ...arrays import Boolean
+from ...base.arrays import Boolean
 from .trajectories import Trajectories
 
 MOST_DRIFT = 0.5  # largest movement of a parked road user along an axis during a run, metres

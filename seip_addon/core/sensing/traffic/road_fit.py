@@ -6,9 +6,9 @@ from dataclasses import replace
 import numpy as np
 import shapely
 
-from ...arrays import Boolean, Float, Integer
-from ...counts import counted
-from ...errors import SeipError
+from ...base.arrays import Boolean, Float, Integer
+from ...base.counts import counted
+from ...base.errors import SeipError
 from ...site.scene_geometry import SceneGeometry, joined
 from .floating_car_data import listed, unwrapped
 from .road_surface import ROAD_TOLERANCE, RoadSurface

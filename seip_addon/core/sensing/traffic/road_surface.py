@@ -3,7 +3,7 @@
 import numpy as np
 import shapely
 
-from ...arrays import Float, Integer
+from ...base.arrays import Float, Integer
 from ...geometry.plan import MIN_AREA, heights_over, plane_height, signed_area
 
 ROAD_TOLERANCE = 1.0

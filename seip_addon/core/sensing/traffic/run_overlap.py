@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 
-from ...arrays import Float
-from ...errors import SeipError
+from ...base.arrays import Float
+from ...base.errors import SeipError
 from .trajectories import Trajectories
 
 MATCH_RADIUS = 1.0  # metres in plan within which two vehicles are at the same place

@@ -7,7 +7,7 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from ...errors import SeipError
+from ...base.errors import SeipError
 from ...site.scene_geometry import SceneGeometry, joined
 from .road_surface import ROAD_TOLERANCE, RoadSurface
 from .trajectories import Trajectories

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...arrays import Boolean, Float
+from ...base.arrays import Boolean, Float
 from .trajectories import Trajectories
 
 WINDOW_SECONDS = 1.8  # seconds over which a pedestrian's position and heading are averaged

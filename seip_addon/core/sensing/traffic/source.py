@@ -9,11 +9,11 @@ from pathlib import Path
 
 import numpy as np
 
-from ...arrays import Float
-from ...counts import counted
-from ...errors import SeipError
-from ...limits import MAP_COORDINATE
-from ...progress import Progress
+from ...base.arrays import Float
+from ...base.counts import counted
+from ...base.errors import SeipError
+from ...base.limits import MAP_COORDINATE
+from ...base.progress import Progress
 from ...site.scene_geometry import SceneGeometry, joined
 from ...storage.xml_stream import Attributes, read_tags
 from .floating_car_data import Extent, read_floating_car_data, read_trajectories

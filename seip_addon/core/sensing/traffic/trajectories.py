@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from ...arrays import Boolean, Float, Integer
-from ...limits import MAP_COORDINATE, ROAD_USER_SIZE, SHARE, SPEED, TIME, UNWRAPPED_ANGLE, Limits
+from ...base.arrays import Boolean, Float, Integer
+from ...base.limits import MAP_COORDINATE, ROAD_USER_SIZE, SHARE, SPEED, TIME, UNWRAPPED_ANGLE, Limits
 from ...storage.array_file import ArrayFile
 from ...storage.files import digest
 

@@ -6,9 +6,9 @@ from collections.abc import Generator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from ...errors import SeipError
-from ...limits import ROAD_USER_SIZE
-from ...progress import Progress
+from ...base.errors import SeipError
+from ...base.limits import ROAD_USER_SIZE
+from ...base.progress import Progress
 from ...storage.xml_stream import Attributes, quoted, read_tags
 
 _SHAPES_OF = {

@@ -30,7 +30,7 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from ...arrays import Boolean, Float, Integer, concatenated_ranges
+from ...base.arrays import Boolean, Float, Integer, concatenated_ranges
 from ..lidar.azimuth_steps import steps_in_arcs
 from ..lidar.model import DetectionLaw, LidarModel
 from .near_surfaces import NearSurfaces

@@ -10,8 +10,8 @@ from typing import Protocol, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ...arrays import Float, Integer
-from ...progress import REPORT_INTERVAL, Progress
+from ...base.arrays import Float, Integer
+from ...base.progress import REPORT_INTERVAL, Progress
 from ...site.candidates import Candidates
 from ...site.site import Site
 from ..lidar.model import LidarModel

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...arrays import Boolean, Float, Integer
-from ...dask_client import connected
-from ...errors import SeipError
+from ...base.arrays import Boolean, Float, Integer
+from ...base.errors import SeipError
+from ...programs.dask_client import connected
 from ...site.site import Site
 from ..lidar.model import LidarModel
 from .chunks import Rows, compute_rows

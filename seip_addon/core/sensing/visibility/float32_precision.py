@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...arrays import Float
+from ...base.arrays import Float
 from ...site.scene_geometry import Mesh, SceneGeometry
 
 MAX_STEP = 1e-3

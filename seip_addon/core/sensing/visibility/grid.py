@@ -17,9 +17,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...arrays import Boolean, Float, Integer
-from ...errors import SeipError
-from ...progress import Progress
+from ...base.arrays import Boolean, Float, Integer
+from ...base.errors import SeipError
+from ...base.progress import Progress
 from ...site.site import Site
 from ...storage.array_file import ArrayFile
 from ...storage.files import digest

@@ -13,7 +13,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 import shapely
 
-from ...arrays import Boolean, Float, Integer
+from ...base.arrays import Boolean, Float, Integer
 from ...geometry.orientation import rotated
 
 _TARGETS_AT_ONCE = 2048  # bounds the memory of the pairs of targets and triangles

@@ -15,7 +15,7 @@ import math
 
 import numpy as np
 
-from ...arrays import Boolean, Float
+from ...base.arrays import Boolean, Float
 from .beam_culling import Beams, NearRays, Planes
 
 

@@ -18,8 +18,8 @@ from typing import Protocol
 
 import numpy as np
 
-from ...arrays import Boolean, Float, Integer
-from ...errors import SeipError
+from ...base.arrays import Boolean, Float, Integer
+from ...base.errors import SeipError
 from .settings import Engine
 
 # Rays are cast a little beyond their range and cut off afterwards, in float64: a hit at the very end of one ray is then

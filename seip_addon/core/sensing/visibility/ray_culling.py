@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from ...arrays import Float, Integer
+from ...base.arrays import Float, Integer
 from .beam_culling import Patches
 
 _AZIMUTHS, _ELEVATIONS = 720, 360  # cells of half a degree: about as far apart as rays are

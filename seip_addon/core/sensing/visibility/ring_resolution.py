@@ -17,7 +17,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from ...arrays import Boolean, Float
+from ...base.arrays import Boolean, Float
 from ...geometry.orientation import orientation
 from ...site.site import Site
 from ..lidar.beams import BeamPattern

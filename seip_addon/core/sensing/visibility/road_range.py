@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import shapely
 
-from ...arrays import Float
+from ...base.arrays import Float
 from ...site.scene_geometry import Mesh, ordered_surfaces
 from ...site.site import Site
 from ..lidar.catalogue import find_models

@@ -23,7 +23,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...arrays import Boolean, Float, Integer, concatenated_ranges
+from ...base.arrays import Boolean, Float, Integer, concatenated_ranges
 from ...geometry.orientation import rotated
 from ..lidar.beams import BeamPattern
 from ..lidar.model import LidarModel

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from ...errors import SeipError
-from ...settings import setting
+from ...base.errors import SeipError
+from ...base.settings import setting
 from ..lidar.model import LidarModel
 
 Engine = Literal["auto", "bvh", "embree"]

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...arrays import Boolean, Float, Integer
+from ...base.arrays import Boolean, Float, Integer
 from ...site.candidates import Candidates
 from ...site.site import Site
 from ...site.target_squares import target_squares

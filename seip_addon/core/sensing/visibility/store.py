@@ -10,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ...errors import SeipError
-from ...progress import Progress
+from ...base.errors import SeipError
+from ...base.progress import Progress
 from ...site.site import Site
 from ...storage.array_file import ArrayFile
 from ..lidar.model import LidarModel

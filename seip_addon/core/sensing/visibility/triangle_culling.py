@@ -14,7 +14,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 import shapely
 
-from ...arrays import Boolean, Float
+from ...base.arrays import Boolean, Float
 from .near_surfaces import caster_tolerance
 
 _POLYGON_FACTOR = 1.01  # by which a circle's radius is enlarged, so that the polygon in its place contains the circle

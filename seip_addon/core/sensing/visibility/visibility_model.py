@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from ...arrays import Boolean, Float
+from ...base.arrays import Boolean, Float
 from ...site.site import Site
 from ..lidar.model import LidarModel
 from .near_surfaces import near_surfaces, rotated_surfaces

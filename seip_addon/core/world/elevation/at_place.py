@@ -10,16 +10,16 @@ import shapely
 from shapely import Polygon
 from shapely.geometry.base import BaseGeometry
 
-from ...arrays import Boolean, Float, Integer
-from ...counts import counted
-from ...errors import SeipError
+from ...base.arrays import Boolean, Float, Integer
+from ...base.counts import counted
+from ...base.errors import SeipError
+from ...base.progress import Progress
+from ...base.settings import setting
 from ...geometry.geo_reference import GeoReference
 from ...geometry.height_raster import HeightRaster
 from ...geometry.plan import outline
 from ...geometry.reference_systems import reprojection
 from ...geometry.solids import Solid
-from ...progress import Progress
-from ...settings import setting
 from ...site.scene_geometry import FROM_SURVEY, HEIGHTS_FROM
 from ..streetscape.description import PlacedSolid, SiteDescription, without_covered_buildings
 from ..streetscape.terrain import Relief

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 from PIL import Image, UnidentifiedImageError
 
-from ...arrays import Float
-from ...errors import SeipError
+from ...base.arrays import Float
+from ...base.errors import SeipError
+from ...base.limits import GROUND, LATITUDE, LONGITUDE, MAP_COORDINATE, Limits
 from ...geometry.height_raster import bilinear
 from ...geometry.reference_systems import GEOGRAPHIC
-from ...limits import GROUND, LATITUDE, LONGITUDE, MAP_COORDINATE, Limits
 from ...site.sources import one_line
 
 MAX_PIXELS = 150_000_000

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...arrays import Boolean, Float, Integer
+from ...base.arrays import Boolean, Float, Integer
 from ...geometry.height_raster import HeightRaster
 from ...geometry.solids import Solid, block, join
 

@@ -11,11 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from ...arrays import Float, Integer
-from ...errors import SeipError
+from ...base.arrays import Float, Integer
+from ...base.errors import SeipError
+from ...base.limits import ELEVATION, MAP_COORDINATE
+from ...base.progress import Progress
 from ...geometry.reference_systems import epsg_code
-from ...limits import ELEVATION, MAP_COORDINATE
-from ...progress import Progress
 
 SURVEY_SUFFIXES = (".las", ".laz")
 BYTES_PER_STEP = 64 << 20

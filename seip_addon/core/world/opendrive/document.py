@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 from defusedxml import DefusedXmlException
 from defusedxml.ElementTree import ParseError, fromstring
 
-from ...errors import SeipError
-from ...limits import MAP_NUMBER
+from ...base.errors import SeipError
+from ...base.limits import MAP_NUMBER
 from ..other_formats import other_format
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ import shapely
 from shapely import Point
 from shapely.geometry.base import BaseGeometry
 
-from ...errors import SeipError
+from ...base.errors import SeipError
 from ...geometry.plan import closed
 from .lanes import LaneSurface
 from .road_map import Junction, RoadMap

@@ -9,9 +9,9 @@ import shapely
 from shapely import Polygon
 from shapely.geometry.base import BaseGeometry
 
-from ...arrays import Float
-from ...errors import SeipError
-from ...limits import ELEVATION
+from ...base.arrays import Float
+from ...base.errors import SeipError
+from ...base.limits import ELEVATION
 from .road_map import Lane, LaneSection, Road, RoadFrame, lifted
 from .sampling import sample
 

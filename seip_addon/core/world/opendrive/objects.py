@@ -6,7 +6,7 @@ import numpy as np
 from shapely import MultiPoint
 from shapely.geometry.base import BaseGeometry
 
-from ...arrays import Float
+from ...base.arrays import Float
 
 TUNNEL = "tunnel"
 """Kind of the objects that stand for the tunnels of a map: lines along the road."""

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...arrays import Float
+from ...base.arrays import Float
 
 _MIN_TERM = 1e-12  # terms of a cubic below this share of the largest one do not move its zeros noticeably
 _MAX_IMAGINARY_PART = 1e-9  # imaginary parts below this come from rounding

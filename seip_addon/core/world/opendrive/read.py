@@ -10,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ... import limits
-from ...errors import SeipError
+from ...base import limits
+from ...base.errors import SeipError
 from ...storage.xml_stream import short
 from .document import Node, read_document
 from .profile import ZERO_PROFILE, Profile, lateral_shape, profile

@@ -6,9 +6,9 @@ from dataclasses import astuple, dataclass, replace
 
 import numpy as np
 
-from ... import limits
-from ...arrays import Float
-from ...errors import SeipError
+from ...base import limits
+from ...base.arrays import Float
+from ...base.errors import SeipError
 from ...geometry.orientation import orientation
 from .document import Node
 from .objects import TUNNEL, Outline, PlacedObject, PlacedSignal

@@ -15,7 +15,7 @@ from typing import Protocol
 
 import numpy as np
 
-from ...arrays import Float
+from ...base.arrays import Float
 
 _ROOTS, _ROOT_WEIGHTS = np.polynomial.legendre.leggauss(16)  # type: ignore[no-untyped-call]  # numpy 1.26 has no types here
 # Nodes and weights of numpy are for [-1, 1]; these are for the unit interval.

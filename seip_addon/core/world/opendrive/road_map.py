@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ...arrays import Float
+from ...base.arrays import Float
 from .objects import PlacedObject, PlacedSignal
 from .profile import FLAT, ZERO_PROFILE, LateralShape, Profile
 from .reference_line import ReferenceLine

@@ -2,7 +2,7 @@
 
 from collections.abc import Collection, Iterable, Iterator, Sequence
 
-from ...counts import counted
+from ...base.counts import counted
 from ..streetscape.levels import UNNAMED_ROAD
 from .extract import Node, Way
 from .signals import SIGNAL_REACH

@@ -8,7 +8,7 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from ...arrays import Float
+from ...base.arrays import Float
 from .extract import Extract, Tags, Way
 from .quantities import metres
 from .street_lanes import lane_widths

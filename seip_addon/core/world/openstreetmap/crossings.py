@@ -8,8 +8,8 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from ...arrays import Boolean, Float
-from ...errors import SeipError
+from ...base.arrays import Boolean, Float
+from ...base.errors import SeipError
 from ...geometry.tangent_plane import plan_metres
 from ..opendrive.junctions import STREETS
 from .extract import Extract, Tags

@@ -9,11 +9,11 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from ...arrays import Float
-from ...counts import counted
-from ...errors import SeipError
+from ...base.arrays import Float
+from ...base.counts import counted
+from ...base.errors import SeipError
+from ...base.progress import Progress
 from ...geometry.tangent_plane import plan_metres
-from ...progress import Progress
 from ...site.sources import one_line
 from ...storage.xml_stream import Attributes, quoted, read_tags
 from ..other_formats import GZIP, other_format
@@ -243,7 +243,7 @@ def read_extract(path: Path, within: Window | None = None) -> Generator[Progress
 
     Examples
     --------
-    >>> from seip_addon.core.progress import finish
+    >>> from seip_addon.core.base.progress import finish
     >>> nodes = '<node id="1" lat="48.000" lon="11.0"/><node id="2" lat="48.001" lon="11.0"/>'
     >>> street = '<way id="5"><nd ref="1"/><nd ref="2"/><tag k="highway" v="residential"/></way>'
     >>> Path("street.osm").write_text(f"<osm>{nodes}{street}</osm>", encoding="utf-8") > 0

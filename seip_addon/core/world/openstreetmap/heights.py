@@ -26,7 +26,7 @@ import shapely
 from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
-from ...arrays import Float, Integer
+from ...base.arrays import Float, Integer
 from ...geometry.plan import beside, travelled
 from ..opendrive.road_map import Road, RoadMap
 from ..streetscape.street_map import Profiles

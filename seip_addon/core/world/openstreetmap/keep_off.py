@@ -6,7 +6,7 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from ...arrays import Float
+from ...base.arrays import Float
 from ...geometry.plan import united
 from ...site.post_rules import RULES, KeepOffArea, RuleName
 from ..streetscape.description import SideWay, Wall

@@ -3,7 +3,7 @@
 import re
 from urllib.parse import unquote
 
-from ...errors import SeipError
+from ...base.errors import SeipError
 from ...storage.xml_stream import quoted
 from .extract import MAX_LATITUDE
 

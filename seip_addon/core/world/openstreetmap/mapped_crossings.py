@@ -11,7 +11,7 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from ...arrays import Float
+from ...base.arrays import Float
 from ..opendrive.lanes import LaneSurface
 from ..opendrive.objects import PlacedObject
 from ..streetscape.named_places import ASSUMED_CROSSING

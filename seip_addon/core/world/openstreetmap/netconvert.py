@@ -6,11 +6,11 @@ from pathlib import Path
 
 import numpy as np
 
-from ...arrays import Float
-from ...errors import SeipError
+from ...base.arrays import Float
+from ...base.errors import SeipError
+from ...base.progress import Progress
 from ...geometry.plan import beside
-from ...progress import Progress
-from ...sumo_programs import find_sumo, run
+from ...programs.sumo_programs import find_sumo, run
 from ..traffic_simulation.street_network import NetworkEdge, StreetNetwork, read_network, shape_text
 from .extract import Way
 from .network_map import PRECISION

@@ -15,8 +15,8 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from ...arrays import Float
-from ...errors import SeipError
+from ...base.arrays import Float
+from ...base.errors import SeipError
 from ...geometry.plan import beside, closed, opened, travelled, united, without
 from ..opendrive.lanes import LaneSurface
 from ..opendrive.objects import PlacedObject, PlacedSignal

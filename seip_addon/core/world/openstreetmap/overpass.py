@@ -18,8 +18,8 @@ from urllib.error import HTTPError, URLError
 from urllib.parse import quote, urlencode, urlsplit
 from urllib.request import Request, build_opener
 
-from ...errors import SeipError
-from ...progress import REPORT_INTERVAL, Progress, in_thread
+from ...base.errors import SeipError
+from ...base.progress import REPORT_INTERVAL, Progress, in_thread
 from ...site.sources import one_line
 from ...storage.files import whole_file
 from .extract import window

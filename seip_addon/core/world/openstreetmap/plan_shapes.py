@@ -8,7 +8,7 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from ...arrays import Float
+from ...base.arrays import Float
 from ...geometry.geo_reference import TransverseMercator
 from .extract import Extract, Node, Relation, Way
 

@@ -8,7 +8,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from ...arrays import Float
+from ...base.arrays import Float
 from .extract import Extract, Tags, Way
 
 SIGNAL_REACH = 40.0  # metres from a stop line to the junction that its signals control, at most

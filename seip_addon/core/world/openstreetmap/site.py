@@ -9,12 +9,12 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from ...arrays import Float
-from ...counts import counted
-from ...errors import SeipError
+from ...base.arrays import Float
+from ...base.counts import counted
+from ...base.errors import SeipError
+from ...base.progress import Progress
 from ...geometry.geo_reference import TransverseMercator, projection
 from ...geometry.plan import united
-from ...progress import Progress
 from ...site.scene_geometry import FROM_EXTRACT
 from ..opendrive.junctions import STREETS, nearest_junctions, streets_of_junctions
 from ..opendrive.lanes import LaneSurface

@@ -7,7 +7,7 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from ...arrays import Float
+from ...base.arrays import Float
 from ...site.post_rules import RuleName
 from ...site.scene_geometry import ASSUMED, FROM_EXTRACT
 from ..streetscape.description import Poles, SideWay, SiteDescription, Slab, Trees, Wall

@@ -8,7 +8,7 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 
 import shapely
 
-from ...errors import SeipError
+from ...base.errors import SeipError
 from ..opendrive.lanes import LaneSurface
 from ..opendrive.road_map import RoadMap
 from ..streetscape.intersections import SAME_DIRECTION, TOUCH

@@ -14,7 +14,7 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 import shapely
 
-from ...arrays import Float
+from ...base.arrays import Float
 from .bridges import Structures, structures
 from .extract import Extract, Node, Tags, Way, reversed_tags
 from .handedness import drives_on_the_left

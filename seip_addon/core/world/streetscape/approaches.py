@@ -9,7 +9,7 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from ...arrays import Float
+from ...base.arrays import Float
 from ..opendrive.lanes import LaneSurface
 from .road_surface import by_road, cut_along, in_groups
 

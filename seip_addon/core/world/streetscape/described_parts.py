@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import shapely
 
-from ...arrays import Float
+from ...base.arrays import Float
 from ...geometry.solids import fence
 from ...site.roles import Role
 from ...site.scene_geometry import DESCRIBED

@@ -12,7 +12,7 @@ import shapely
 from shapely import MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 
-from ...arrays import Float
+from ...base.arrays import Float
 from ...geometry.plan import covered_share
 from ...geometry.solids import Solid
 from ...site.post_rules import KeepOffArea, RuleName

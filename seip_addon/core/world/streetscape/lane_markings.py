@@ -6,7 +6,7 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from ...arrays import Float
+from ...base.arrays import Float
 from ...geometry.plan import without
 from ..opendrive.lanes import LaneSurface
 from .road_surface import group, in_groups, inner_edge, interpolated, outer_edge

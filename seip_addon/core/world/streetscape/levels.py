@@ -10,8 +10,8 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from ...arrays import Float
-from ...errors import SeipError
+from ...base.arrays import Float
+from ...base.errors import SeipError
 from ..opendrive.lanes import LaneSurface
 from .road_surface import MAX_SEAM, by_road, group, is_near
 from .terrain import Terrain

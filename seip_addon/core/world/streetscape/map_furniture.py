@@ -7,7 +7,7 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from ...arrays import Float
+from ...base.arrays import Float
 from ...geometry.solids import Solid, block, fence
 from ...site.roles import Role
 from ...site.scene_geometry import FROM_MAP

@@ -8,12 +8,12 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from ...arrays import Float
-from ...counts import counted
-from ...errors import SeipError
+from ...base.arrays import Float
+from ...base.counts import counted
+from ...base.errors import SeipError
+from ...base.progress import Progress
 from ...geometry.plan import covered_share, united, without
 from ...geometry.solids import Solid
-from ...progress import Progress
 from ...site.post_rules import RULES
 from ...site.roles import AREA_OVERLAYS, Role
 from ...site.scene_geometry import ASSUMED, NamedArea

@@ -6,7 +6,7 @@ from enum import Enum
 
 import numpy as np
 
-from ...arrays import Float
+from ...base.arrays import Float
 from ..opendrive.objects import TUNNEL, PlacedObject
 
 FLAT_KINDS = {TUNNEL, "crosswalk", "parkingspace", "roadmark", "roadsurface", "patch"}

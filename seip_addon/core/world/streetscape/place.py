@@ -8,10 +8,10 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from ...arrays import Float
-from ...errors import SeipError
+from ...base.arrays import Float
+from ...base.errors import SeipError
+from ...base.limits import SITE_RADIUS
 from ...geometry.plan import closed, opened, united
-from ...limits import SITE_RADIUS
 from ...site.scene_geometry import DEFAULT_WEIGHT
 from ..opendrive.junctions import find_junction, junction_area, nearest_junctions
 from ..opendrive.lanes import LaneSurface

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 import shapely
 
-from ...arrays import Float
+from ...base.arrays import Float
 from ..opendrive.lanes import LaneSurface
 from ..opendrive.road_map import RoadLink, RoadMap
 from .road_surface import CARRIAGEWAY, by_road, in_groups

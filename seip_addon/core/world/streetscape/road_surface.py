@@ -10,7 +10,7 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 from shapely.geometry.polygon import orient
 
-from ...arrays import Float, Integer
+from ...base.arrays import Float, Integer
 from ...geometry.plan import closed, outline, signed_area, united, without
 from ..opendrive.lanes import LaneSurface
 from .terrain import Terrain, cut

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 
-from ...arrays import Float
+from ...base.arrays import Float
 from ...site.roles import Role
 from ...site.scene_geometry import ASSUMED, FROM_MAP
 from ..opendrive.objects import PlacedObject, PlacedSignal

@@ -14,9 +14,9 @@ import numpy as np
 from shapely import MultiPolygon, Polygon
 from shapely.validation import explain_validity
 
-from ... import limits
-from ...arrays import Float
-from ...errors import SeipError
+from ...base import limits
+from ...base.arrays import Float
+from ...base.errors import SeipError
 from ...site.scene_geometry import DEFAULT_WEIGHT
 from ...storage.toml_table import Key, Reader, is_number, number, parse_toml, read_table, text, toml_text
 from .description import Area, Building, Poles, SiteDescription, Trees, Wall, WeightedRegion

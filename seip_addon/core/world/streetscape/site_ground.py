@@ -8,7 +8,7 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from ...arrays import Float
+from ...base.arrays import Float
 from ...geometry.plan import outline, united, without
 from ..opendrive.lanes import LaneSurface
 from . import road_surface

@@ -7,7 +7,7 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from ...arrays import Float
+from ...base.arrays import Float
 from ...geometry.plan import outline, signed_area, united, without
 from ...geometry.solids import from_faces
 from ...site.roles import AREA_OVERLAYS, Role

@@ -13,7 +13,7 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from ...arrays import Float
+from ...base.arrays import Float
 from ...geometry.plan import closed, opened, united, without
 from ..opendrive.lanes import LaneSurface
 from ..opendrive.road_map import Road

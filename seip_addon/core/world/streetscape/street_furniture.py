@@ -8,7 +8,7 @@ from collections import Counter
 import numpy as np
 import shapely
 
-from ...arrays import Float
+from ...base.arrays import Float
 from ...geometry.solids import Solid, join, prism, signed_area, tube
 from .terrain import triangulate
 

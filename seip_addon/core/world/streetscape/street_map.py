@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from shapely.geometry.base import BaseGeometry
 
-from ...arrays import Float
-from ...progress import Progress
+from ...base.arrays import Float
+from ...base.progress import Progress
 from ..opendrive.lanes import LaneSurface, lane_surfaces
 from ..opendrive.profile import linear_profile
 from ..opendrive.road_map import RoadMap

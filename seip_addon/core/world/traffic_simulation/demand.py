@@ -8,8 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...errors import SeipError
-from ...settings import setting
+from ...base.errors import SeipError
+from ...base.settings import setting
 from ...storage.files import whole_file
 from .street_network import DRIVING, PARKED_CLASS, PARKING, WALKING, NetworkEdge, NetworkLane, StreetNetwork
 

@@ -8,9 +8,10 @@ from pathlib import Path
 import numpy as np
 import shapely
 
-from ...arrays import Float
-from ...errors import SeipError
-from ...progress import Progress
+from ...base.arrays import Float
+from ...base.errors import SeipError
+from ...base.progress import Progress
+from ...programs.sumo_programs import NETWORK_SUFFIX, Sumo, find_sumo, run
 from ...sensing.traffic.floating_car_data import Extent
 from ...sensing.traffic.overlaps import without_overlaps
 from ...sensing.traffic.road_fit import fit_to_road
@@ -19,7 +20,6 @@ from ...sensing.traffic.source import ROAD_MARGIN, TrafficFiles, read_sumo, road
 from ...sensing.traffic.trajectories import Trajectories
 from ...site.scene_geometry import SceneGeometry
 from ...storage.files import whole_file
-from ...sumo_programs import NETWORK_SUFFIX, Sumo, find_sumo, run
 from ..opendrive.read import read_map
 from ..opendrive.road_map import RoadMap
 from ..streetscape.road_surface import GROUPS

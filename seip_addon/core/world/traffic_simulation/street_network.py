@@ -7,11 +7,11 @@ from xml.sax.saxutils import unescape
 
 import numpy as np
 
-from ...arrays import Float
-from ...counts import counted
-from ...errors import SeipError
-from ...limits import MAP_COORDINATE, ROAD_LENGTH, Limits
-from ...progress import finish
+from ...base.arrays import Float
+from ...base.counts import counted
+from ...base.errors import SeipError
+from ...base.limits import MAP_COORDINATE, ROAD_LENGTH, Limits
+from ...base.progress import finish
 from ...storage.xml_stream import Attributes, quoted, read_tags
 
 WALKING, PARKING, DRIVING, OTHER = "walking", "parking", "driving", "other"  # uses of lanes

@@ -8,11 +8,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from seip_addon.core.base.progress import Progress, finish
 from seip_addon.core.choosing.network import network_search
 from seip_addon.core.choosing.network.allocation import allocate, allocation_of, relaxed_allocation
 from seip_addon.core.choosing.network.frontier import Frontier, Options, SolvedBudget, possible_amounts
 from seip_addon.core.choosing.network.network_search import Goal, search_allocations
-from seip_addon.core.progress import Progress, finish
 
 MOST = 3
 

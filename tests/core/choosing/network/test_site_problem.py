@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from seip_addon.core.base.errors import SeipError
+from seip_addon.core.base.progress import finish
 from seip_addon.core.choosing.network.site_problem import SiteProblem, check_problem
-from seip_addon.core.errors import SeipError
-from seip_addon.core.progress import finish
 from tests.builders.random_site import random_problem
 from tests.few import few
 

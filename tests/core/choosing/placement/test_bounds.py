@@ -8,9 +8,9 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
+from seip_addon.core.base.errors import SeipError
 from seip_addon.core.choosing.placement.bounds import bound_at, compositions, falling_bounds, rest_of
 from seip_addon.core.choosing.placement.instance import make_instance
-from seip_addon.core.errors import SeipError
 from tests.builders.placement_problems import all_choices, random_problem, row_problem
 from tests.oracles.random_cases import cases
 

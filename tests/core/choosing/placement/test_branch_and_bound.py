@@ -7,14 +7,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from seip_addon.core.base.errors import SeipError
+from seip_addon.core.base.progress import finish
 from seip_addon.core.choosing.placement import branch_and_bound
 from seip_addon.core.choosing.placement.branch_and_bound import BranchAndBound, GainSearch
 from seip_addon.core.choosing.placement.incumbent import Incumbent
 from seip_addon.core.choosing.placement.instance import make_instance
 from seip_addon.core.choosing.placement.risk import Risk
 from seip_addon.core.choosing.placement.search_limits import Work
-from seip_addon.core.errors import SeipError
-from seip_addon.core.progress import finish
 from tests.builders.placement_problems import all_choices, random_problem
 from tests.oracles.random_cases import cases
 

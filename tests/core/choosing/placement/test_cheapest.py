@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from seip_addon.core.acceptance import Acceptance
+from seip_addon.core.base.acceptance import Acceptance
+from seip_addon.core.base.errors import SeipError
+from seip_addon.core.base.progress import finish
 from seip_addon.core.choosing.placement.cheapest import UNPROVEN_PRICE, cheapest_for_share
 from seip_addon.core.choosing.placement.search_limits import SolverLimits
-from seip_addon.core.errors import SeipError
-from seip_addon.core.progress import finish
 from tests.builders.placement_problems import HALVES, hard_problem, row_problem
 
 PRICES = np.array([6.0, 6.0, 5.0, 2.0])

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from seip_addon.core.base.progress import finish
 from seip_addon.core.choosing.placement.concave import LOG_RETURNS
 from seip_addon.core.choosing.placement.search_limits import SolverLimits
 from seip_addon.core.choosing.placement.solver import MORE, front_of, solve
-from seip_addon.core.progress import finish
 from tests.builders.placement_problems import HALVES, hard_problem, random_problem, row_problem
 
 AT_ONCE = 1e-6  # work after which searches end at once

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
+from seip_addon.core.base.errors import SeipError
+from seip_addon.core.base.progress import finish
 from seip_addon.core.choosing.placement.concave import LOG_RETURNS
 from seip_addon.core.choosing.placement.instance import common_unit, make_instance
 from seip_addon.core.choosing.placement.problem import PlacementProblem
 from seip_addon.core.choosing.placement.solver import solve
-from seip_addon.core.errors import SeipError
-from seip_addon.core.progress import finish
 from tests.builders.placement_problems import HALVES, row_problem
 
 

@@ -10,6 +10,8 @@ import numpy as np
 import pulp.apis.coin_api
 import pytest
 
+from seip_addon.core.base.errors import SeipError
+from seip_addon.core.base.progress import finish
 from seip_addon.core.choosing.placement import integer_program
 from seip_addon.core.choosing.placement.incumbent import Incumbent
 from seip_addon.core.choosing.placement.instance import make_instance
@@ -22,8 +24,6 @@ from seip_addon.core.choosing.placement.integer_program import (
 )
 from seip_addon.core.choosing.placement.search_limits import SolverLimits, Work
 from seip_addon.core.choosing.placement.solver import solve
-from seip_addon.core.errors import SeipError
-from seip_addon.core.progress import finish
 from tests.builders.placement_problems import HALVES, all_choices, hard_problem, random_problem, row_problem
 
 

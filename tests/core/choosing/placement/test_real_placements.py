@@ -5,8 +5,8 @@ import time
 
 import pytest
 
+from seip_addon.core.base.progress import finish
 from seip_addon.core.choosing.placement.solver import solve
-from seip_addon.core.progress import finish
 from tests.oracles.placement_faults import problem_of
 from tests.oracles.plain_search import plain_search
 from tests.sumo_here import needs_sumo

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from seip_addon.core.base.errors import SeipError
+from seip_addon.core.base.progress import finish
 from seip_addon.core.choosing.placement.risk import Risk
 from seip_addon.core.choosing.placement.solver import solve
-from seip_addon.core.errors import SeipError
-from seip_addon.core.progress import finish
 from tests.builders.placement_problems import row_problem
 
 OUTCOMES = np.array([4.0, 1.0, 3.0, 2.0, 5.0])

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
+from seip_addon.core.base.progress import finish
 from seip_addon.core.choosing.placement import search
 from seip_addon.core.choosing.placement.feasibility import serving_choice
 from seip_addon.core.choosing.placement.incumbent import Incumbent
 from seip_addon.core.choosing.placement.instance import make_instance
 from seip_addon.core.choosing.placement.search_limits import Work
-from seip_addon.core.progress import finish
 from tests.builders.placement_problems import all_choices, random_problem
 
 

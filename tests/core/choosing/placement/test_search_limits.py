@@ -6,11 +6,11 @@ from itertools import count
 
 import pytest
 
-from seip_addon.core.acceptance import Acceptance
+from seip_addon.core.base.acceptance import Acceptance
+from seip_addon.core.base.errors import SeipError
+from seip_addon.core.base.progress import finish
 from seip_addon.core.choosing.placement.search_limits import OPERATIONS_PER_UNIT, SolverLimits, Work
 from seip_addon.core.choosing.placement.solver import solve
-from seip_addon.core.errors import SeipError
-from seip_addon.core.progress import finish
 from tests.builders.placement_problems import hard_problem
 
 

@@ -8,13 +8,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from seip_addon.core.acceptance import Acceptance
+from seip_addon.core.base.acceptance import Acceptance
+from seip_addon.core.base.errors import SeipError
+from seip_addon.core.base.progress import Pace, finish
 from seip_addon.core.choosing.placement.concave import LOG_RETURNS
 from seip_addon.core.choosing.placement.risk import Risk
 from seip_addon.core.choosing.placement.search_limits import SolverLimits
 from seip_addon.core.choosing.placement.solver import UNPROVEN, solve, solve_greedy
-from seip_addon.core.errors import SeipError
-from seip_addon.core.progress import Pace, finish
 from tests.builders.placement_problems import HALVES, hard_problem, random_problem, row_problem
 from tests.oracles.random_cases import cases
 

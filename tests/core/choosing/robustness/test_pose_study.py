@@ -6,9 +6,9 @@ from headless.studies.stability.robustness_rows import pose_rows
 
 import pytest
 
+from seip_addon.core.base.progress import finish
 from seip_addon.core.choosing.placement.deployment import deploy
 from seip_addon.core.choosing.robustness.pose_study import pose_study
-from seip_addon.core.progress import finish
 from seip_addon.core.sensing.lidar.catalogue import load_catalogue
 from seip_addon.core.sensing.scenarios.pose_errors import ERROR_KINDS, PoseErrors
 from seip_addon.core.sensing.visibility.grid import compute_visibility

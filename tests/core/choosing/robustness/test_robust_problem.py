@@ -6,12 +6,12 @@ from functools import cache
 import numpy as np
 import pytest
 
+from seip_addon.core.base.progress import finish
 from seip_addon.core.choosing.placement.objective import Objective, placement_problem
 from seip_addon.core.choosing.placement.risk import Risk
 from seip_addon.core.choosing.placement.scenarios import Scenarios
 from seip_addon.core.choosing.placement.search_limits import SolverLimits
 from seip_addon.core.choosing.robustness.robust_problem import RobustProblem
-from seip_addon.core.progress import finish
 from seip_addon.core.sensing.lidar.catalogue import load_catalogue
 from seip_addon.core.sensing.scenarios.visibility_under_errors import visibility_under_errors
 from seip_addon.core.sensing.visibility.grid import VisibilitySettings, compute_visibility

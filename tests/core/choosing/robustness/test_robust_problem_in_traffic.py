@@ -8,11 +8,11 @@ from headless.studies.stability.robustness_rows import hidden, traffic_rows
 import numpy as np
 import pytest
 
+from seip_addon.core.base.progress import finish
 from seip_addon.core.choosing.placement.objective import Objective, placement_problem
 from seip_addon.core.choosing.placement.risk import Risk
 from seip_addon.core.choosing.placement.scenarios import Scenarios
 from seip_addon.core.choosing.robustness.robust_problem import RobustProblem
-from seip_addon.core.progress import finish
 from seip_addon.core.sensing.lidar.catalogue import load_catalogue
 from seip_addon.core.sensing.scenarios.traffic_instants import spread_instants
 from seip_addon.core.sensing.scenarios.visibility_in_traffic import visibility_in_traffic

@@ -5,12 +5,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from seip_addon.core.base.progress import finish
 from seip_addon.core.choosing.placement.instance import make_instance
 from seip_addon.core.choosing.placement.risk import Risk
 from seip_addon.core.choosing.placement.search_limits import SolverLimits
 from seip_addon.core.choosing.placement.solver import solve
 from seip_addon.core.choosing.robustness.robust_problem import outcomes_of, solve_over
-from seip_addon.core.progress import finish
 from seip_addon.core.sensing.scenarios.scenario_visibility import ScenarioVisibility
 from tests.builders.placement_problems import all_choices, random_problem
 from tests.oracles.random_cases import cases

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from seip_addon.core.errors import SeipError
+from seip_addon.core.base.errors import SeipError
 from seip_addon.core.output.datasets.dataset_folder import load_manifest, write_dataset
 from seip_addon.core.output.datasets.formats import FORMATS
 from tests.builders.scan_frames import contents, make_frame, make_frames, make_run, make_sensors, write

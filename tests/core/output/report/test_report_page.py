@@ -9,9 +9,10 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
+from seip_addon.core.base.errors import SeipError
+from seip_addon.core.base.progress import finish
 from seip_addon.core.choosing.placement.objective import MOVED, FrontPoint, Objective
 from seip_addon.core.choosing.placement.returns_summary import ReturnsPoint, ReturnsSummary
-from seip_addon.core.errors import SeipError
 from seip_addon.core.output.report.blocks import Card, Facts, Paragraph, Picture, Table
 from seip_addon.core.output.report.evidence import load_evidence
 from seip_addon.core.output.report.html import as_html
@@ -19,7 +20,6 @@ from seip_addon.core.output.report.sections import make_report, write_report
 from seip_addon.core.output.report.wording import proof, returns_within
 from seip_addon.core.output.results.answer import costs_of
 from seip_addon.core.output.results.file_names import REPORT_FILES
-from seip_addon.core.progress import finish
 from seip_addon.core.site.installed_cost import load_installed_cost
 from tests.builders.report_folder import CROSSING, NAME, make_folder
 

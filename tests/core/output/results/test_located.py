@@ -9,8 +9,8 @@ import pytest
 import shapely
 from shapely.geometry import shape
 
+from seip_addon.core.base.errors import SeipError
 from seip_addon.core.choosing.placement.objective import Objective, placement_constraints
-from seip_addon.core.errors import SeipError
 from seip_addon.core.geometry.geo_reference import GeoReference
 from seip_addon.core.output.results.geographic_files import NAMESPACE, located, save_geojson, save_kml
 from seip_addon.core.output.results.site_file import load_site_file, save_site_file

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from seip_addon.core.base.errors import SeipError
 from seip_addon.core.choosing.placement.objective import MOVED, Objective, Solution
 from seip_addon.core.choosing.placement.problem import Placement
 from seip_addon.core.choosing.placement.returns_summary import CrossingReturns, ReturnsSummary
-from seip_addon.core.errors import SeipError
 from seip_addon.core.geometry.geo_reference import GeoReference
 from seip_addon.core.output.results.placement_record import (
     PlacementRecord,

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from seip_addon.core.errors import SeipError
+from seip_addon.core.base.errors import SeipError
 from seip_addon.core.output.results.verification_record import (
     SCHEMA,
     VerificationRecord,

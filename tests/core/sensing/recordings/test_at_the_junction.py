@@ -5,7 +5,7 @@ import pytest
 
 pytest.importorskip("bpy")
 
-from seip_addon.core.progress import finish
+from seip_addon.core.base.progress import finish
 from seip_addon.core.sensing.recordings.background import learn_background
 from seip_addon.core.sensing.recordings.recorded_frames import prepare_frames
 from seip_addon.core.sensing.recordings.recording import Recording

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from seip_addon.core.errors import SeipError
-from seip_addon.core.progress import finish
+from seip_addon.core.base.errors import SeipError
+from seip_addon.core.base.progress import finish
 from seip_addon.core.sensing.lidar.catalogue import load_catalogue
 from seip_addon.core.sensing.recordings.background import (
     LEAST_HEIGHT,

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from seip_addon.core.errors import SeipError
+from seip_addon.core.base.errors import SeipError
 from seip_addon.core.output.datasets.formats import kitti_results, openpcdet_results
 from seip_addon.core.sensing.recordings.box_labels import read_labels
 from seip_addon.core.sensing.traffic.trajectories import CATEGORIES

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import yaml
 
-from seip_addon.core.errors import SeipError
+from seip_addon.core.base.errors import SeipError
 from seip_addon.core.output.datasets.formats import CALIBRATION
 from seip_addon.core.sensing.recordings.poses import read_poses
 from tests.builders.scan_frames import rotation

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from seip_addon.core.errors import SeipError
+from seip_addon.core.base.errors import SeipError
 from seip_addon.core.sensing.lidar.catalogue import load_catalogue
 from seip_addon.core.sensing.recordings.ray_grid import RayGrid, recovered_rays
 from tests.builders.street_recording import canyon_sweeps

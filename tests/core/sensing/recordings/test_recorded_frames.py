@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import shapely
 
-from seip_addon.core.progress import finish
+from seip_addon.core.base.progress import finish
 from seip_addon.core.sensing.recordings.box_labels import BoxLabels
 from seip_addon.core.sensing.recordings.recorded_frames import RecordedScene, prepare_frames
 from seip_addon.core.sensing.recordings.recording import Recording

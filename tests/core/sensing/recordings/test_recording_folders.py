@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from seip_addon.core.errors import SeipError
+from seip_addon.core.base.errors import SeipError
 from seip_addon.core.sensing.recordings.recording import Recording, open_recording, paired
 from seip_addon.core.sensing.recordings.sensor_recording import SensorRecording
 from tests.builders.recording_files import make_points, write_sweep_file

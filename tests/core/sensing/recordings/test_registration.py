@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from seip_addon.core.errors import SeipError
+from seip_addon.core.base.errors import SeipError
 from seip_addon.core.sensing.recordings.registration import register
 from tests.builders.scanned_street import (
     box_mesh,

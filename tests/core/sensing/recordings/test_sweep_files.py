@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from seip_addon.core.errors import SeipError
+from seip_addon.core.base.errors import SeipError
 from seip_addon.core.geometry.orientation import quaternion_of
 from seip_addon.core.sensing.recordings.pcd_file import lzf_decompressed
 from seip_addon.core.sensing.recordings.sweep_files import read_sweep

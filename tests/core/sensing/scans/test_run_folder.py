@@ -9,8 +9,8 @@ from itertools import islice
 import numpy as np
 import pytest
 
-from seip_addon.core.errors import SeipError
-from seip_addon.core.progress import finish
+from seip_addon.core.base.errors import SeipError
+from seip_addon.core.base.progress import finish
 from seip_addon.core.sensing.lidar.rosette import Rosette
 from seip_addon.core.sensing.scans.frame import Frame
 from seip_addon.core.sensing.scans.run_folder import (

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from seip_addon.core.errors import SeipError
+from seip_addon.core.base.errors import SeipError
+from seip_addon.core.base.progress import finish
 from seip_addon.core.geometry.orientation import orientation
-from seip_addon.core.progress import finish
 from seip_addon.core.sensing.lidar.catalogue import load_catalogue
 from seip_addon.core.sensing.scenarios.pose_errors import PoseErrors, draw_errors, out_of_objects
 from seip_addon.core.sensing.scenarios.visibility_under_errors import visibility_under_errors

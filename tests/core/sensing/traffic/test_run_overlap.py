@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from seip_addon.core.errors import SeipError
+from seip_addon.core.base.errors import SeipError
 from seip_addon.core.sensing.traffic.run_overlap import overlap_of, require_independent, vehicle_positions
 from seip_addon.core.sensing.traffic.trajectories import Trajectories
 from tests.builders.traffic_by_hand import make_trajectories

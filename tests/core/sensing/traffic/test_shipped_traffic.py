@@ -7,7 +7,7 @@ import bpy
 import numpy as np
 import pytest
 
-from seip_addon.core.progress import finish
+from seip_addon.core.base.progress import finish
 from seip_addon.core.sensing.traffic.overlaps import find_overlaps
 from seip_addon.core.sensing.traffic.road_fit import fit_to_road
 from seip_addon.core.sensing.traffic.trajectories import CATEGORIES, Trajectories

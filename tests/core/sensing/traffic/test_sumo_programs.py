@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from seip_addon.core import sumo_programs
-from seip_addon.core.errors import SeipError
-from seip_addon.core.progress import finish
-from seip_addon.core.sumo_programs import Sumo, find_sumo, run, sumo_version
+from seip_addon.core.base.errors import SeipError
+from seip_addon.core.base.progress import finish
+from seip_addon.core.programs import sumo_programs
+from seip_addon.core.programs.sumo_programs import Sumo, find_sumo, run, sumo_version
 from tests.builders.sumo_wheel import write_programs
 
 PYTHON = Path(sys.executable)

@@ -8,8 +8,8 @@ import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 
-from seip_addon.core.errors import SeipError
-from seip_addon.core.progress import finish
+from seip_addon.core.base.errors import SeipError
+from seip_addon.core.base.progress import finish
 from seip_addon.core.sensing.traffic.overlaps import find_overlaps, footprints, without_overlaps
 from seip_addon.core.sensing.traffic.road_fit import ROAD_TOLERANCE, fit_to_road
 from seip_addon.core.sensing.traffic.smooth_walks import smooth_walks

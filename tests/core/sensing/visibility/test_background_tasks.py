@@ -4,12 +4,12 @@ import time
 
 import pytest
 
-from seip_addon.background import Background
-from seip_addon.core.errors import SeipError
-from seip_addon.core.progress import Pace, Progress
+from seip_addon.core.base.errors import SeipError
+from seip_addon.core.base.progress import Pace, Progress
 from seip_addon.core.sensing.lidar.catalogue import load_catalogue
 from seip_addon.core.sensing.visibility.grid import compute_visibility
 from seip_addon.core.sensing.visibility.settings import VisibilitySettings
+from seip_addon.state.background import Background
 from tests.builders.synthetic_junction import junction_site
 
 SITE = junction_site(positions=80, heights=[4.0, 6.0, 8.0], spacing=1.0)

@@ -12,8 +12,8 @@ from pathlib import Path
 
 import pytest
 
-from seip_addon.core.errors import SeipError
-from seip_addon.core.progress import finish
+from seip_addon.core.base.errors import SeipError
+from seip_addon.core.base.progress import finish
 from seip_addon.core.sensing.lidar.catalogue import load_catalogue
 from seip_addon.core.sensing.visibility.grid import compute_visibility
 from seip_addon.core.sensing.visibility.settings import VisibilitySettings
@@ -46,7 +46,7 @@ def cluster() -> Iterator[object]:
 @needs_dask
 @pytest.mark.parametrize("address", ["tcp://127.0.0.1:1", "nonsense://"])
 def test_a_scheduler_that_does_not_answer_has_its_sentence(address: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("seip_addon.core.dask_client._CONNECT_TIMEOUT", 0.5)
+    monkeypatch.setattr("seip_addon.core.programs.dask_client._CONNECT_TIMEOUT", 0.5)
     with pytest.raises(SeipError, match="no Dask scheduler answers at"):
         finish(compute_visibility(SITE, MODELS, SETTINGS, ANY, scheduler=address))
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import shapely
 
-from seip_addon.core.progress import finish
+from seip_addon.core.base.progress import finish
 from seip_addon.core.sensing.lidar.beams import BeamPattern
 from seip_addon.core.sensing.lidar.model import LidarModel
 from seip_addon.core.sensing.visibility.float32_precision import FLOAT32_STEP, rounding_warnings

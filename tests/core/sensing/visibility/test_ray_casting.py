@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from seip_addon.core.errors import SeipError
+from seip_addon.core.base.errors import SeipError
 from seip_addon.core.sensing.visibility.ray_casting import BvhRayCaster, EmbreeRayCaster, make_ray_caster
 from seip_addon.core.sensing.visibility.settings import Engine
 from tests.engines import each_engine

@@ -11,11 +11,11 @@ import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 
+from seip_addon.core.base.errors import SeipError
+from seip_addon.core.base.progress import finish
 from seip_addon.core.choosing.placement.deployment import deploy
 from seip_addon.core.choosing.placement.objective import Objective
-from seip_addon.core.errors import SeipError
 from seip_addon.core.geometry.orientation import orientation, orientations
-from seip_addon.core.progress import finish
 from seip_addon.core.sensing.lidar.catalogue import load_catalogue
 from seip_addon.core.sensing.lidar.range_equation import RangeEquation
 from seip_addon.core.sensing.scans.sensor import level_orientation

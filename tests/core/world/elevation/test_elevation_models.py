@@ -7,10 +7,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image
 
-from seip_addon.core.errors import SeipError
+from seip_addon.core.base.errors import SeipError
+from seip_addon.core.base.progress import finish
 from seip_addon.core.geometry.geo_reference import GeoReference
 from seip_addon.core.geometry.height_raster import HeightRaster
-from seip_addon.core.progress import finish
 from seip_addon.core.world.elevation.at_place import MapSurroundings, TerrainRequest, with_terrain
 from seip_addon.core.world.elevation.geotiff import read_geotiff
 from seip_addon.core.world.streetscape.description import SiteDescription

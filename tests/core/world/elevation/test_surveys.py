@@ -9,10 +9,10 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from seip_addon.core.errors import SeipError
+from seip_addon.core.base.errors import SeipError
+from seip_addon.core.base.progress import finish
 from seip_addon.core.geometry.geo_reference import GeoReference, projection
 from seip_addon.core.geometry.height_raster import HeightRaster
-from seip_addon.core.progress import finish
 from seip_addon.core.site.scene_geometry import FROM_EXTRACT, FROM_SURVEY
 from seip_addon.core.world.elevation import obstacles
 from seip_addon.core.world.elevation.at_place import MapSurroundings, TerrainRequest, with_terrain

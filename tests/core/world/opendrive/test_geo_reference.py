@@ -6,8 +6,8 @@ import math
 import numpy as np
 import pytest
 
-from seip_addon.core.errors import SeipError
-from seip_addon.core.progress import finish
+from seip_addon.core.base.errors import SeipError
+from seip_addon.core.base.progress import finish
 from seip_addon.core.world.opendrive.read import read_map
 from seip_addon.core.world.openstreetmap.site import place_on_map
 from seip_addon.core.world.streetscape.description import SiteDescription

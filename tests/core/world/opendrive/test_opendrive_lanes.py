@@ -8,7 +8,7 @@ import shapely
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from seip_addon.core.errors import SeipError
+from seip_addon.core.base.errors import SeipError
 from seip_addon.core.world.opendrive.junctions import junction_area
 from tests.builders.opendrive_text import document, geometry, lane, map_lanes, read_text, road, section
 from tests.oracles.random_cases import cases

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import shapely
 
-from seip_addon.core.progress import finish
+from seip_addon.core.base.progress import finish
 from seip_addon.core.workflows.site_places import site_places
 from seip_addon.core.world.opendrive.junctions import junction_area
 from seip_addon.core.world.opendrive.lanes import lane_surfaces

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from seip_addon.core.errors import SeipError
+from seip_addon.core.base.errors import SeipError
 from seip_addon.core.world.opendrive.junctions import find_junction
 from seip_addon.core.world.opendrive.read import read_map
 from tests.builders.opendrive_text import document, geometry, lane, map_lanes, read_text, road, section

@@ -12,7 +12,7 @@ import pytest
 import shapely
 from defusedxml.ElementTree import parse
 
-from seip_addon.core.sumo_programs import find_sumo
+from seip_addon.core.programs.sumo_programs import find_sumo
 from seip_addon.core.world.opendrive.junctions import junction_area
 from seip_addon.core.world.opendrive.lanes import LaneSurface
 from seip_addon.core.world.opendrive.objects import PlacedObject

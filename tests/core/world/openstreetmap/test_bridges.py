@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 import shapely
 
-from seip_addon.core.errors import SeipError
+from seip_addon.core.base.errors import SeipError
+from seip_addon.core.base.progress import finish
 from seip_addon.core.geometry.plan import surface_height
-from seip_addon.core.progress import finish
 from seip_addon.core.site.roles import Role
 from seip_addon.core.site.scene_geometry import OTHER_LEVELS
 from seip_addon.core.workflows.site_building import SiteRequest, build_site

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from seip_addon.core.progress import finish
+from seip_addon.core.base.progress import finish
 from seip_addon.core.workflows.site_places import site_places
 from seip_addon.core.world.openstreetmap import extract as reading
 from seip_addon.core.world.openstreetmap.crossings import named_crossings

@@ -4,8 +4,8 @@ import gzip
 
 import pytest
 
-from seip_addon.core.errors import SeipError
-from seip_addon.core.progress import finish
+from seip_addon.core.base.errors import SeipError
+from seip_addon.core.base.progress import finish
 from seip_addon.core.world.openstreetmap import extract as reading
 from seip_addon.core.world.openstreetmap.extract import read_extract, window
 from tests.builders.osm_text import crossing

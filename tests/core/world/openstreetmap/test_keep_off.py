@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import shapely
 
+from seip_addon.core.base.progress import finish
 from seip_addon.core.geometry.geo_reference import projection
-from seip_addon.core.progress import finish
 from seip_addon.core.world.openstreetmap.extract import read_extract
 from seip_addon.core.world.openstreetmap.plan_shapes import PlanShapes
 from seip_addon.core.world.openstreetmap.street_objects import surroundings

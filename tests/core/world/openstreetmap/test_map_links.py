@@ -2,7 +2,7 @@
 
 import pytest
 
-from seip_addon.core.errors import SeipError
+from seip_addon.core.base.errors import SeipError
 from seip_addon.core.world.openstreetmap.map_links import parsed_position
 
 HERE = (52.47391, 13.44048)

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 import shapely
 
-from seip_addon.core.errors import SeipError
+from seip_addon.core.base.errors import SeipError
+from seip_addon.core.base.progress import finish
 from seip_addon.core.geometry.tangent_plane import plan_metres
-from seip_addon.core.progress import finish
 from seip_addon.core.workflows.network_sites import extract_xml
 from seip_addon.core.world.openstreetmap.crossings import SAME_JUNCTION, selected_junctions
 from seip_addon.core.world.openstreetmap.extract import cropped, read_extract, window

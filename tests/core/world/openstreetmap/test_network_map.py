@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import shapely
 
-from seip_addon.core.errors import SeipError
+from seip_addon.core.base.errors import SeipError
 from seip_addon.core.world.openstreetmap.network_map import credited, read_network_map
 from seip_addon.core.world.traffic_simulation.street_network import read_network
 

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from seip_addon.core.errors import SeipError
-from seip_addon.core.progress import finish, progress_line
+from seip_addon.core.base.errors import SeipError
+from seip_addon.core.base.progress import finish, progress_line
 from seip_addon.core.world.openstreetmap import overpass
 from seip_addon.core.world.openstreetmap.extract import read_extract
 from seip_addon.core.world.openstreetmap.overpass import OverpassServer, download_extract, is_outgrown, user_cache

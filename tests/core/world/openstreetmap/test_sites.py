@@ -8,10 +8,10 @@ import pytest
 import shapely
 import shapely.affinity
 
-from seip_addon.core import sumo_programs
-from seip_addon.core.errors import SeipError
+from seip_addon.core.base.errors import SeipError
+from seip_addon.core.base.progress import finish
 from seip_addon.core.geometry.geo_reference import projection
-from seip_addon.core.progress import finish
+from seip_addon.core.programs import sumo_programs
 from seip_addon.core.site.roles import Role
 from seip_addon.core.workflows.site_building import SiteRequest, build_site
 from tests.builders.osm_text import (

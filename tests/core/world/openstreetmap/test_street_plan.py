@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
+from seip_addon.core.base.progress import finish
 from seip_addon.core.geometry.geo_reference import TransverseMercator
-from seip_addon.core.progress import finish
 from seip_addon.core.workflows.site_places import site_places
 from seip_addon.core.world.openstreetmap.crossings import named_crossings
 from seip_addon.core.world.openstreetmap.extract import read_extract

@@ -5,7 +5,7 @@ import itertools
 import pytest
 from defusedxml.ElementTree import fromstring
 
-from seip_addon.core.progress import finish
+from seip_addon.core.base.progress import finish
 from seip_addon.core.world.openstreetmap.extract import read_extract, window
 from seip_addon.core.world.openstreetmap.handedness import drives_on_the_left
 from seip_addon.core.world.openstreetmap.streets import is_street, is_track, write_streets

@@ -8,8 +8,8 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from seip_addon.core.base.progress import finish
 from seip_addon.core.geometry.geo_reference import projection
-from seip_addon.core.progress import finish
 from seip_addon.core.world.openstreetmap.buildings import USUAL_HEIGHT
 from seip_addon.core.world.openstreetmap.extract import read_extract
 from seip_addon.core.world.openstreetmap.plan_shapes import DRAWN_TWICE, PIECES, PlanShapes

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from seip_addon.core.errors import SeipError
-from seip_addon.core.progress import finish
+from seip_addon.core.base.errors import SeipError
+from seip_addon.core.base.progress import finish
 from seip_addon.core.site.roles import Role
 from seip_addon.core.site.scene_geometry import OTHER_LEVELS
 from seip_addon.core.world.opendrive.read import read_map

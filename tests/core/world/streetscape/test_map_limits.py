@@ -6,8 +6,8 @@ import tracemalloc
 import numpy as np
 import pytest
 
-from seip_addon.core.errors import SeipError
-from seip_addon.core.progress import finish
+from seip_addon.core.base.errors import SeipError
+from seip_addon.core.base.progress import finish
 from seip_addon.core.site.roles import Role
 from seip_addon.core.world.streetscape.description import SiteDescription
 from seip_addon.core.world.streetscape.site_file import describe_place, read_site_description

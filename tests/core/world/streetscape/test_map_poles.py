@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from seip_addon.core.progress import finish
+from seip_addon.core.base.progress import finish
 from seip_addon.core.site.candidates import assumed_pole_warnings, generate_candidates
 from seip_addon.core.site.roles import Role
 from seip_addon.core.site.scene_geometry import ASSUMED, FROM_EXTRACT, FROM_MAP, Pole

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import shapely
 
-from seip_addon.core.progress import finish
+from seip_addon.core.base.progress import finish
 from seip_addon.core.world.streetscape.description import SiteDescription
 from tests.builders.map_models import site_model
 from tests.builders.opendrive_text import read_text

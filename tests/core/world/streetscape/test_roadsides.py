@@ -5,7 +5,7 @@ import math
 import pytest
 import shapely
 
-from seip_addon.core.progress import finish
+from seip_addon.core.base.progress import finish
 from seip_addon.core.site.roles import Role
 from seip_addon.core.world.streetscape.description import SiteDescription
 from tests.builders.map_models import site_model

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 import shapely
 
+from seip_addon.core.base.progress import finish
 from seip_addon.core.geometry.plan import signed_area
-from seip_addon.core.progress import finish
 from seip_addon.core.site.roles import Role
 from seip_addon.core.world.opendrive.read import read_map
 from seip_addon.core.world.streetscape.description import Area, Building, Poles, SiteDescription, Trees

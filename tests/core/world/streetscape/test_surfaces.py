@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import shapely
 
-from seip_addon.core.progress import finish
+from seip_addon.core.base.progress import finish
 from seip_addon.core.site.roles import Role
 from seip_addon.core.workflows.site_building import SiteRequest, build_site
 from seip_addon.core.world.opendrive.lanes import LaneSurface

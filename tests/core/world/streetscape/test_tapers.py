@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import shapely
 
-from seip_addon.core.progress import finish
+from seip_addon.core.base.progress import finish
 from seip_addon.core.workflows.site_building import SiteRequest, build_site
 from tests.builders.osm_text import Extract
 from tests.oracles.face_areas import plan

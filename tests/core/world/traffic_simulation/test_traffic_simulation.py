@@ -8,12 +8,12 @@ from xml.etree import ElementTree as ET
 import numpy as np
 import pytest
 
-from seip_addon.core import sumo_programs
-from seip_addon.core.errors import SeipError
-from seip_addon.core.progress import finish
+from seip_addon.core.base.errors import SeipError
+from seip_addon.core.base.progress import finish
+from seip_addon.core.programs import sumo_programs
+from seip_addon.core.programs.sumo_programs import find_sumo
 from seip_addon.core.sensing.traffic.floating_car_data import Extent, read_floating_car_data, read_trajectories
 from seip_addon.core.sensing.traffic.vehicle_types import read_vehicle_types
-from seip_addon.core.sumo_programs import find_sumo
 from seip_addon.core.world.traffic_simulation import simulation as sumo
 from seip_addon.core.world.traffic_simulation.demand import VEHICLE_SHARES, Demand, write_routes
 from seip_addon.core.world.traffic_simulation.street_network import DRIVING, WALKING, read_network

@@ -6,16 +6,16 @@ from collections.abc import Sequence
 import bpy
 import numpy as np
 
-from .core.output.pictures.colours import By, cloud_colours, sensor_colour, strength_ramp
-from .core.output.pictures.palette import MAX_INTENSITY, STATIC_COLOUR, rgb
-from .core.sensing.scans.frame import Frame
-from .core.sensing.scans.run_folder import Run
-from .core.sensing.scans.sensor import MountedSensor
-from .core.sensing.scans.simulation import Simulation
-from .core.workflows.recording import frame_number
-from .overlay import Block, Colour, Entry, Layer, Overlay
-from .session import LastScan, session
-from .viewport import overlays
+from ..core.output.pictures.colours import By, cloud_colours, sensor_colour, strength_ramp
+from ..core.output.pictures.palette import MAX_INTENSITY, STATIC_COLOUR, rgb
+from ..core.sensing.scans.frame import Frame
+from ..core.sensing.scans.run_folder import Run
+from ..core.sensing.scans.sensor import MountedSensor
+from ..core.sensing.scans.simulation import Simulation
+from ..core.workflows.recording import frame_number
+from ..state.overlay import Block, Colour, Entry, Layer, Overlay
+from ..state.session import LastScan, session
+from . import overlays
 
 NAME = "point cloud"
 RAMP_STEPS = 8

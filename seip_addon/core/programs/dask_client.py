@@ -11,7 +11,7 @@ from tempfile import TemporaryDirectory
 from types import ModuleType
 from typing import Any
 
-from .errors import SeipError
+from ..base.errors import SeipError
 
 _CONNECT_TIMEOUT = 20  # seconds
 _CLOSE_TIMEOUT = 0.5  # seconds that a worker has to end by itself when the command is interrupted

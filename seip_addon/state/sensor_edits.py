@@ -5,12 +5,12 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
-from .core.arrays import Float
-from .core.errors import SeipError
-from .core.output.results.placement_record import RecordedSensor, parsed_record
-from .core.workflows.moved_sensors import BY_HAND
-from .scene import contract
-from .scene.sensors import labelled_sensors, pose_of
+from ..core.base.arrays import Float
+from ..core.base.errors import SeipError
+from ..core.output.results.placement_record import RecordedSensor, parsed_record
+from ..core.workflows.moved_sensors import BY_HAND
+from ..scene import contract
+from ..scene.sensors import labelled_sensors, pose_of
 
 POSE_TOLERANCE = 1e-5  # of single precision: of rotations absolute, of positions relative beyond a metre
 

@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable, Generator, Sequence
 from pathlib import Path
 
-from .progress import REPORT_INTERVAL, Progress
+from ..base.progress import REPORT_INTERVAL, Progress
 
 
 def run_logged(

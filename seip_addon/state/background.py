@@ -5,7 +5,7 @@ from collections.abc import Generator
 from concurrent.futures import CancelledError, Future
 from typing import Generic, TypeVar
 
-from .core.progress import Progress, finish
+from ..core.base.progress import Progress, finish
 
 Result = TypeVar("Result")
 

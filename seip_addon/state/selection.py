@@ -4,8 +4,8 @@ from collections.abc import Iterator
 
 import bpy
 
-from .scene import contract
-from .scene.sensors import placed_sensors
+from ..scene import contract
+from ..scene.sensors import placed_sensors
 from .session import session
 
 

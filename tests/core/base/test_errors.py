@@ -2,7 +2,7 @@
 
 import unicodedata
 
-from seip_addon.core.errors import SeipError
+from seip_addon.core.base.errors import SeipError
 
 
 def test_a_sentence_that_repeats_a_whole_file_loses_its_middle():

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bpy
 
-from .scene.pieces import copied_pieces, loose_pieces, tidy_pieces
+from ..scene.pieces import copied_pieces, loose_pieces, tidy_pieces
 
 
 def _on_update(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:

@@ -4,10 +4,10 @@ import sys
 
 import pytest
 
-from seip_addon.core.errors import SeipError
-from seip_addon.core.progress import finish
-from seip_addon.core.sumo_installation import SUMO_VERSION, install_sumo, installed_sumo
-from seip_addon.core.sumo_programs import find_sumo, sumo_version
+from seip_addon.core.base.errors import SeipError
+from seip_addon.core.base.progress import finish
+from seip_addon.core.programs.sumo_installation import SUMO_VERSION, install_sumo, installed_sumo
+from seip_addon.core.programs.sumo_programs import find_sumo, sumo_version
 from tests.builders.sumo_wheel import write_wheel
 
 PIP = (sys.executable, "-m", "pip")

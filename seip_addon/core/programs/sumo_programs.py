@@ -1,6 +1,6 @@
 """Search for and execution of the programs of SUMO (Eclipse Simulation of Urban MObility), an optional extra.
 
-Its use is shown in `tests/core/test_sumo_installation.py`.
+Its use is shown in `tests/core/programs/test_sumo_installation.py`.
 """
 
 import importlib.util
@@ -12,8 +12,8 @@ from collections.abc import Generator, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from .errors import SeipError
-from .progress import Progress, in_thread
+from ..base.errors import SeipError
+from ..base.progress import Progress, in_thread
 
 MISSING = (
     "SUMO is not installed, which lays out streets and simulates traffic: install Eclipse SUMO and put sumo and "

@@ -2,13 +2,14 @@
 
 import bpy
 
-from . import preferences, scene_status
-from .core.errors import SeipError
-from .core.sensing.lidar.catalogue import load_catalogue
-from .core.sensing.lidar.model import LidarModel
-from .core.site.candidates import DEFAULT_TYPE
-from .scene import contract
-from .scene.sensors import labelled_sensors
+from .. import preferences
+from ..core.base.errors import SeipError
+from ..core.sensing.lidar.catalogue import load_catalogue
+from ..core.sensing.lidar.model import LidarModel
+from ..core.site.candidates import DEFAULT_TYPE
+from ..scene import contract
+from ..scene.sensors import labelled_sensors
+from . import scene_status
 from .session import session
 
 PAPER = "generic"

@@ -9,10 +9,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from ..base.errors import SeipError
+from ..base.progress import Progress
+from ..storage.files import check_folder, unfinished_name
 from .child_process import run_logged
-from .errors import SeipError
-from .progress import Progress
-from .storage.files import check_folder, unfinished_name
 from .sumo_programs import Sumo, find_sumo, sumo_version
 
 SUMO_VERSION = "1.28.0"

@@ -3,7 +3,7 @@
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from seip_addon.core.distinct_names import distinct_names
+from seip_addon.core.base.distinct_names import distinct_names
 
 
 @given(st.lists(st.one_of(st.from_regex(r"[aAß](-[12])*", fullmatch=True), st.text(max_size=3)), max_size=30))

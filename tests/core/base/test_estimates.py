@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import scipy.stats
 
-from seip_addon.core.estimates import IntervalEstimate, quantile_of, student_quantile
+from seip_addon.core.base.estimates import IntervalEstimate, quantile_of, student_quantile
 
 
 @pytest.mark.parametrize("freedom", [1, 30, 1000])

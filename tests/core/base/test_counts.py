@@ -2,7 +2,7 @@
 
 import pytest
 
-from seip_addon.core.counts import counted
+from seip_addon.core.base.counts import counted
 
 
 @pytest.mark.parametrize(

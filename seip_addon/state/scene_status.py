@@ -9,11 +9,11 @@ from dataclasses import replace
 
 import bpy
 
-from .core.errors import SeipError
-from .core.output.results.placement_record import parsed_record
-from .core.workflows.survey_settings import SurveySettings
-from .scene import contract
-from .scene.sensors import labelled_sensors
+from ..core.base.errors import SeipError
+from ..core.output.results.placement_record import parsed_record
+from ..core.workflows.survey_settings import SurveySettings
+from ..scene import contract
+from ..scene.sensors import labelled_sensors
 from .session import session
 
 FILE_VERSION = 1

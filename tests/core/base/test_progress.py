@@ -2,8 +2,8 @@
 
 import pytest
 
-from seip_addon.core import progress
-from seip_addon.core.progress import Progress, finish, progress_line, reporter, time_text, within
+from seip_addon.core.base import progress
+from seip_addon.core.base.progress import Progress, finish, progress_line, reporter, time_text, within
 
 
 @pytest.mark.parametrize(

@@ -14,19 +14,19 @@ from dataclasses import replace
 
 import bpy
 
-from . import preferences
-from .core.errors import SeipError
-from .core.output.results.placement_record import PlacementRecord, parsed_record
-from .core.progress import Progress
-from .core.storage.files import check_folder
-from .core.workflows.records import inputs_of, restored_solution
-from .core.workflows.survey import Survey, lay_out, see
-from .scene import changes
-from .scene.changes import watch
-from .scene.read import SceneReading, read_scene
-from .scene_status import FILE_VERSION, obstacle, same_grid
-from .session import SceneState, session
-from .viewport import overlays
+from .. import preferences
+from ..core.base.errors import SeipError
+from ..core.base.progress import Progress
+from ..core.output.results.placement_record import PlacementRecord, parsed_record
+from ..core.storage.files import check_folder
+from ..core.workflows.records import inputs_of, restored_solution
+from ..core.workflows.survey import Survey, lay_out, see
+from ..scene import changes
+from ..scene.changes import watch
+from ..scene.read import SceneReading, read_scene
+from ..state.scene_status import FILE_VERSION, obstacle, same_grid
+from ..state.session import SceneState, session
+from ..viewport import overlays
 
 LOAD_DELAY = 0.2
 """Seconds from the opening of a file to the work on it."""

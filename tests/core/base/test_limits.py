@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from seip_addon.core import limits
-from seip_addon.core.errors import SeipError
-from seip_addon.core.limits import Limits
+from seip_addon.core.base import limits
+from seip_addon.core.base.errors import SeipError
+from seip_addon.core.base.limits import Limits
 
 ALL = {name: value for name, value in vars(limits).items() if isinstance(value, Limits)}
 

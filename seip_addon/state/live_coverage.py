@@ -8,16 +8,16 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from . import preferences
-from .core.arrays import Boolean, Integer
-from .core.choosing.placement.deployment import Deployment
-from .core.errors import SeipError
-from .core.sensing.scans.sensor import MountedSensor
-from .core.sensing.visibility.visibility_model import VisibilityModel
-from .core.workflows.returns import SensorReturns
-from .scene import contract
-from .scene.coverage_colours import show_seen_by
-from .scene.sensors import read_sensors
+from .. import preferences
+from ..core.base.arrays import Boolean, Integer
+from ..core.base.errors import SeipError
+from ..core.choosing.placement.deployment import Deployment
+from ..core.sensing.scans.sensor import MountedSensor
+from ..core.sensing.visibility.visibility_model import VisibilityModel
+from ..core.workflows.returns import SensorReturns
+from ..scene import contract
+from ..scene.coverage_colours import show_seen_by
+from ..scene.sensors import read_sensors
 from .sensor_edits import same_pose
 from .session import FollowedSensors, SceneState, scene_of, session
 

@@ -16,27 +16,27 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ..core.base.acceptance import Acceptance
+from ..core.base.arrays import Boolean
+from ..core.base.errors import SeipError
+from ..core.base.progress import Progress
+from ..core.choosing.placement.objective import Solution
+from ..core.choosing.placement.returns_summary import ReturnsSummary
+from ..core.sensing.lidar.model import LidarModel
+from ..core.sensing.recordings.verification import Verification
+from ..core.sensing.scans.frame import Frame
+from ..core.sensing.scans.run_folder import Run
+from ..core.sensing.scans.sensor import MountedSensor
+from ..core.sensing.scans.simulation import Simulation
+from ..core.sensing.visibility.visibility_model import VisibilityModel
+from ..core.site.check import SiteCheck
+from ..core.workflows.returns import SensorReturns
+from ..core.workflows.site_places import SitePlaces
+from ..core.workflows.survey import Layout, Survey
+from ..core.workflows.survey_settings import SurveySettings
+from ..scene.changes import Watch
 from .background import Background
-from .core.acceptance import Acceptance
-from .core.arrays import Boolean
-from .core.choosing.placement.objective import Solution
-from .core.choosing.placement.returns_summary import ReturnsSummary
-from .core.errors import SeipError
-from .core.progress import Progress
-from .core.sensing.lidar.model import LidarModel
-from .core.sensing.recordings.verification import Verification
-from .core.sensing.scans.frame import Frame
-from .core.sensing.scans.run_folder import Run
-from .core.sensing.scans.sensor import MountedSensor
-from .core.sensing.scans.simulation import Simulation
-from .core.sensing.visibility.visibility_model import VisibilityModel
-from .core.site.check import SiteCheck
-from .core.workflows.returns import SensorReturns
-from .core.workflows.site_places import SitePlaces
-from .core.workflows.survey import Layout, Survey
-from .core.workflows.survey_settings import SurveySettings
 from .overlay import Overlay
-from .scene.changes import Watch
 
 
 @dataclass(frozen=True)

@@ -38,7 +38,7 @@ class Limits:
     >>> height.require([3.5, -2.0], "site.toml", "height")
     Traceback (most recent call last):
     ...
-    seip_addon.core.errors.SeipError: site.toml: height is -2, not 0.01 to 1,000 m; correct it
+    seip_addon.core.base.errors.SeipError: site.toml: height is -2, not 0.01 to 1,000 m; correct it
     """
 
     least: float

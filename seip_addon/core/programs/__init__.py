@@ -1,0 +1,1 @@
+"""Other programs and clusters that the core starts: SUMO, child processes, Dask."""
