@@ -12,8 +12,8 @@ from gpu_extras.batch import batch_for_shader
 
 from ..core.base.arrays import Float, Integer
 from ..core.geometry.map_view import MapView, under_mouse
-from ..core.output.pictures.labels import StreetLabel, start_of, street_labels
 from ..core.output.pictures.palette import MAP_GROUND, MAP_JUNCTION, MAP_STREETS, rgb
+from ..core.output.pictures.street_labels import StreetLabel, start_of, street_labels
 from ..core.world.opendrive.junctions import STREETS
 from .legend import FONT, INK, PAPER, TEXT_SIZE, fill, write
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from seip_addon.core.geometry.map_view import MapView
-from seip_addon.core.output.pictures.labels import REPEATED, street_labels
+from seip_addon.core.output.pictures.street_labels import REPEATED, street_labels
 from seip_addon.core.world.street_plan import NamePlaces
 
 FRAME = (0.0, 0.0, 1000.0, 800.0)
