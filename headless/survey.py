@@ -18,7 +18,7 @@ import bpy
 import numpy as np
 
 from seip_addon.core.base.counts import counted
-from seip_addon.core.base.progress import Progress, finish
+from seip_addon.core.base.progress import Progress
 from seip_addon.core.base.settings import settings_of
 from seip_addon.core.choosing.placement.deployment import Sensor
 from seip_addon.core.choosing.placement.objective import Objective, Solution
@@ -58,8 +58,7 @@ class Stopwatch:
 
     def run(self, step: str, steps: Generator[Progress, None, Result]) -> Result:
         """Run work in steps to its end behind a progress bar."""
-        with runtime.progress_bar() as report:
-            return self.time(step, lambda: finish(steps, report))
+        return self.time(step, lambda: runtime.finish_with_bar(steps))
 
 
 def add_options(parser: argparse.ArgumentParser) -> tuple[argparse._ArgumentGroup, ...]:
@@ -112,7 +111,7 @@ def scene_path(scene: Path | None) -> Path:
 def survey(
     options: argparse.Namespace, check: Callable[[Layout], None], objective: Objective | None = None
 ) -> tuple[Survey, Stopwatch]:
-    """Read the scene, lay out its site, and find or compute its visibility grid; return with it how long that took.
+    """Survey a scene: read it, lay out its site, and find or compute its visibility grid.
 
     Parameters
     ----------
@@ -122,6 +121,17 @@ def survey(
         Called before any ray is cast: refuses what cannot be had on the layout.
     objective : Objective, optional
         Objective of the placement that follows, for an early answer.
+
+    Returns
+    -------
+    Survey, Stopwatch
+        The survey, and the seconds of each of its steps.
+
+    Raises
+    ------
+    SeipError
+        A sensor type is unknown, the folder cannot be written or holds a run, the scene cannot be read, or ``check``
+        refuses its layout.
     """
     settings = read_survey_settings(options)
     settings.models()  # refuses unknown types before the scene is read

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Generator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
@@ -23,6 +24,7 @@ from seip_addon.core.workflows.finalists import JudgementRequest
 
 from .average_precision import (
     MIN_TEST_RUNS,
+    Evaluation,
     average_precision_interval,
     average_precisions_of_runs,
     evaluate,
@@ -31,6 +33,7 @@ from .average_precision import (
 )
 from .detector import SHIPPED_DETECTOR, Detector
 from .frame_results import FrameResult
+from .matching import counted_road_users
 from .recordings import MountedSensors, SampledRun, Simulator, sampled_runs
 from .rules import CLASSES, RULES
 from .shared_scans import SharedScans, detect_with_all
@@ -68,16 +71,19 @@ Judge = Callable[[Sequence[int], int], Generator[Progress, None, Sequence[Score]
 """From the finalists that are left, and the number of the round, to their scores in all frames so far."""
 
 
-def halve(count: int, rounds: int, judge: Judge) -> Generator[Progress, None, list[int]]:
+def race(count: int, rounds: int, judge: Judge) -> Generator[Progress, None, list[int]]:
     """Judge finalists in rounds until one is left, and return their numbers, the winner first.
 
     After each round those go that are behind the leader by a difference whose 95 % interval, over the same runs,
-    excludes zero: later rounds, which have more frames, cost less (successive halving; Jamieson and Talwalkar 2016).
+    excludes zero (racing; Maron and Moore 1994), so that later rounds, which have more frames, cost less. The intervals
+    are not corrected for the number of comparisons.
 
     Parameters
     ----------
-    count : int
-        Number of finalists.
+    count, rounds : int
+        Number of finalists, and largest number of rounds.
+    judge : callable
+        Scores the finalists that are left.
     """
     rank, left = [(0, 0.0)] * count, list(range(count))  # rounds in which each was judged, and its score after them
     for number in range(rounds):
@@ -142,7 +148,7 @@ def judge_finalists(
         weights = counted_classes(frames[left[0]], request.weights)
         return [score_of(frames[one], weights) for one in left]
 
-    ranked = yield from halve(len(placements), len(ROUNDS), judge)
+    ranked = yield from race(len(placements), len(ROUNDS), judge)
     shown = list(dict.fromkeys([*ranked[:2], 0]))
     found = yield from detect_with_all(shared, others, detector, folder, placements=shown)
     final = dict(zip(shown, found, strict=True))
@@ -168,10 +174,11 @@ def judge_finalists(
 
 def _split(runs: Sequence[SampledRun], geometry: SceneGeometry) -> tuple[Sequence[SampledRun], Sequence[SampledRun]]:
     """Return the runs to choose by, and those for figures; they must be independent traffic of the site."""
-    if len({run.name for run in runs}) < len(runs) or len(runs) < 2:
-        raise SeipError(
-            f"finalists are judged on two runs of traffic or more with different names, better sixteen, not {len(runs)}"
-        )
+    if len(runs) < 2:
+        raise SeipError(f"finalists are judged on two runs of traffic or more, better sixteen, not {len(runs)}")
+    name, times = Counter(run.name for run in runs).most_common(1)[0]
+    if times > 1:
+        raise SeipError(f"{times} runs of traffic are named {name!r}: rename their files")
     check_runs([run.trajectories for run in runs], geometry.region)
     for run in runs:
         require_own_traffic(run.trajectories, geometry, run.name)
@@ -193,8 +200,7 @@ def counted_classes(frames: Sequence[FrameResult], weights: Mapping[str, float])
     runs = len(np.unique(names))
     counted = {}
     for name, weight in weights.items():
-        wanted = RULES[CLASSES[name]].categories
-        present = [bool((one.truth.inside & np.isin(one.truth.category, wanted)).any()) for one in frames]
+        present = [bool(counted_road_users(one, RULES[CLASSES[name]]).any()) for one in frames]
         if weight and len(np.unique(names[present])) >= min(MIN_TEST_RUNS, runs):
             counted[name] = weight
     if not counted:
@@ -204,8 +210,12 @@ def counted_classes(frames: Sequence[FrameResult], weights: Mapping[str, float])
 
 def score_of(frames: Sequence[FrameResult], weights: Mapping[str, float]) -> Score:
     """Return the weighted mean of the average precision of the classes."""
+    return _mean_score([evaluate(frames, RULES[CLASSES[name]]) for name in weights], weights)
+
+
+def _mean_score(own: Sequence[Evaluation], weights: Mapping[str, float]) -> Score:
+    """Return the weighted mean of the average precision of evaluations, one for each class."""
     share = np.array(list(weights.values())) / sum(weights.values())
-    own = [evaluate(frames, RULES[CLASSES[name]]) for name in weights]
     runs = int(own[0].run.max()) + 1
     value = float(share @ [one.average_precision for one in own])
     if runs < MIN_TEST_RUNS:
@@ -216,7 +226,7 @@ def score_of(frames: Sequence[FrameResult], weights: Mapping[str, float]) -> Sco
 def precisions_of(frames: Sequence[FrameResult], weights: Mapping[str, float]) -> dict[str, Figure]:
     """Return average precision by class, and the weighted mean, with intervals over the runs."""
     own = {name: evaluate(frames, RULES[CLASSES[name]]) for name in weights}
-    score = score_of(frames, weights)
+    score = _mean_score(list(own.values()), weights)
     users = sum(len(one.wanted) for one in own.values())
     interval = None if score.without is None else share_interval(score.value, score.without, users)
     each = {name: Figure(one.average_precision, average_precision_interval(one)) for name, one in own.items()}

@@ -44,7 +44,9 @@ def open_blend(path: Path) -> None:
 
 
 def require_readable_names() -> None:
-    """Check that all names of the open file can be read: Blender opens damaged files whose names are not UTF-8.
+    """Check that the names in the open file that are used can be read.
+
+    Blender opens damaged files whose names are not UTF-8.
 
     Raises
     ------
@@ -65,7 +67,7 @@ def require_readable_names() -> None:
 def check_name(path: Path) -> None:
     """Raise SeipError where a name does not end in .blend."""
     if path.suffix != ".blend":
-        raise SeipError(f"{path} is no name for a Blender file; let it end in .blend")
+        raise SeipError(f"{path} does not end in .blend; choose a name that does")
 
 
 def save_blend(path: Path) -> None:
@@ -82,19 +84,20 @@ def save_blend(path: Path) -> None:
     if bpy.app.background:  # else the views are those that somebody is looking through
         _set_up_views()
     with whole_file(path) as temporary:
-        temporary.unlink()  # Blender would keep a backup of a file that is there
-        full = SeipError(f"cannot write {path} to its end; make room there or choose another folder")
+        temporary.unlink()  # Blender would keep a file that is there as a backup of another name
+        cure = "make room there or choose another folder"
         try:
             with held_signals():
                 bpy.ops.wm.save_as_mainfile(
                     filepath=str(temporary.resolve()), copy=True, compress=True, check_existing=False
                 )
         except RuntimeError as error:
-            raise full from error
+            reason = str(error).strip().removeprefix("Error: ")
+            raise SeipError(f"cannot write {path} ({reason}); {cure}") from error
         finally:
-            Path(f"{temporary}@").unlink(missing_ok=True)  # as far as Blender came
+            Path(f"{temporary}@").unlink(missing_ok=True)  # Blender writes there first, and leaves it if it fails
         if not _is_whole(temporary):
-            raise full
+            raise SeipError(f"cannot write {path} to its end; {cure}")
 
 
 def _is_whole(path: Path) -> bool:

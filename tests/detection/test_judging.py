@@ -13,7 +13,7 @@ from headless import finalists as finalists_command
 from headless import place
 from headless.detection import judging, shared_scans
 from headless.detection.average_precision import evaluate
-from headless.detection.judging import Score, counted_classes, halve, judge_finalists, score_of
+from headless.detection.judging import Score, counted_classes, judge_finalists, race, score_of
 from headless.detection.rules import CLASSES, RULES
 
 import bpy
@@ -56,21 +56,21 @@ def judge_of(quality, spread, runs, random):
 
 
 @pytest.mark.parametrize("seed", range(50))
-def test_halving_drops_those_that_are_clearly_behind_and_never_the_best(seed):
+def test_a_race_drops_those_that_are_clearly_behind_and_never_the_best(seed):
     random = np.random.default_rng(seed)
     quality = random.permutation(np.concatenate([[0.8], random.uniform(0.4, 0.65, 11)]))
     judge, judged = judge_of(quality, 0.05, 8, random)
-    best, *_ = finish(halve(12, 3, judge))
+    best, *_ = finish(race(12, 3, judge))
     assert best == int(np.argmax(quality))
     assert all(best in left for left in judged)
     assert sum(map(len, judged)) < 18  # of 36
 
 
-def test_halving_keeps_those_that_are_alike_to_the_end():
+def test_a_race_keeps_those_that_are_alike_to_the_end():
     random = np.random.default_rng(1)
     quality = np.array([0.5, 0.8, 0.805, 0.55])
     judge, judged = judge_of(quality, 0.05, 8, random)
-    ranked = finish(halve(4, 3, judge))
+    ranked = finish(race(4, 3, judge))
     assert [len(left) for left in judged] == [4, 2, 2]
     assert (set(ranked[:2]), ranked[2:]) == ({1, 2}, [3, 0])
 
@@ -83,7 +83,7 @@ def test_without_intervals_nobody_is_dropped():
         yield Progress(0, 1, "judge")
         return [Score(0.1 * one) for one in left]
 
-    assert finish(halve(4, 3, judge)) == [3, 2, 1, 0]
+    assert finish(race(4, 3, judge)) == [3, 2, 1, 0]
     assert rounds == [[0, 1, 2, 3]] * 3
 
 
@@ -168,11 +168,11 @@ def score_of_three(frames, weights):
     return score_of(frames, weights).value
 
 
-@pytest.mark.parametrize("count", [1, 2])
-def test_runs_must_be_two_of_different_names(site, count):
+@pytest.mark.parametrize(("count", "message"), [(1, "two runs of traffic or more"), (2, "2 runs of traffic are named")])
+def test_runs_must_be_two_of_different_names(site, count, message):
     geometry, request, models, weather, paths = site
     given = [paths[0]] * count
-    with pytest.raises(SeipError, match="two runs of traffic or more with different names"):
+    with pytest.raises(SeipError, match=message):
         finish(judge_finalists(geometry, request, models, weather, given, "unused"))
 
 

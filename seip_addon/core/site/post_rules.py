@@ -15,7 +15,7 @@ from ..base.errors import SeipError
 from ..geometry.plan import closed, without
 
 RuleName = Literal["cycle-tracks", "driveways", "landings", "private", "islands", "power-poles"]
-AllowedName = Literal["cycle-tracks", "driveways", "landings", "private", "islands", "power-poles", "assumed-poles"]
+AllowedName = Literal[RuleName, "assumed-poles"]
 
 MIN_ISLAND_WIDTH = 4.0
 """Metres: islands and medians narrower than this are reserved for pedestrians, signals and signs."""
@@ -47,8 +47,8 @@ RULES: dict[RuleName, Rule] = {
     "driveways": Rule("Driveways", "on a driveway"),
     "landings": Rule("Crossing landings", "on a crossing landing"),
     "private": Rule("Private ground", "on private ground"),
-    "islands": Rule("Islands", f"on an island narrower than {MIN_ISLAND_WIDTH:g} m, or on one of an extract"),
-    "power-poles": Rule("Power poles", "power poles"),
+    "islands": Rule("Islands", f"on an island narrower than {MIN_ISLAND_WIDTH:g} m, or a small one of an extract"),
+    "power-poles": Rule("Power poles", "on a power pole"),
 }
 """Rules in order of application: a position is counted for the first rule that excludes it."""
 

@@ -63,6 +63,6 @@ def test_power_poles_carry_nothing_unless_they_are_allowed():
     )
     plain = generate_candidates(street(poles=poles), PLAIN)
     assert set(plain.position_name[plain.on_pole]) == {"lamp", "meant"}
-    assert plain.dropped["power poles"] == 1
+    assert plain.dropped["on a power pole"] == 1
     asked = generate_candidates(street(poles=poles), replace(PLAIN, allow=("power-poles",)))
     assert set(asked.position_name[asked.on_pole]) == {"lamp", "mains", "meant"}

@@ -25,11 +25,12 @@ from .solver import Describe, search_and_prove
 BOUND_STEPS, PRICE_STEPS = 300, 3  # steps of the bound on the value of any placement, and then of that on its price
 REPORTED = 10  # steps between two reports
 FINISHING_SHARE, LEAST_FINISHING = 0.25, 0.5
-"""Share of the work, and least units of it, for the choice among equally cheap placements."""
+"""Share of the work left that each round keeps back, and least units of it, for the choice among equally cheap ones."""
 UNPROVEN_PRICE = (
     "the search ended before this placement was proven the cheapest: the gap is the share of its price that another "
     "one may save"
 )
+UNPROVEN_NUMBER = "the search ended before this number of sensors was proven the smallest"
 
 
 def cheapest_for_share(
@@ -67,7 +68,7 @@ class _Cheapest:
         self, problem: PlacementProblem, share: float, limits: SolverLimits, describe: Describe | None
     ) -> None:
         self._problem, self._solver, self._describe = problem, limits.solver, describe
-        self._work = limits.work()
+        self._share, self._work = share, limits.work()
         self._instance = make_instance(problem)
         self._whole = math.fsum(problem.weights) / self._instance.unit
         goal = share * self._whole * (1 - TIE_TOLERANCE)
@@ -82,7 +83,7 @@ class _Cheapest:
         if first.value < self._goal:
             raise SeipError(self._unreached(first))
         chosen, proven = without_idle(first, self._goal), False
-        while not proven and work.left > 0 and (cheaper := self._cheaper(chosen)) is not None:
+        while work.left > 0 and (cheaper := self._cheaper(chosen)) is not None:
             served = yield from serving_choice(cheaper, self._solver)
             if served is None:
                 proven = True
@@ -94,7 +95,7 @@ class _Cheapest:
             chosen = without_idle(found, self._goal)
         proven = proven or self._cheaper(chosen) is None
         least = math.fsum(self._instance.price[chosen]) if proven else (yield from self._least_price(chosen))
-        return (yield from self._finished(chosen, least))
+        return (yield from self._finished(chosen, least, proven=proven))
 
     def _searched(
         self, instance: Instance, most: float, start: Integer, known: Integer | None = None
@@ -107,7 +108,7 @@ class _Cheapest:
 
     def _unreached(self, incumbent: Incumbent) -> str:
         """Return the message that the goal is out of reach, or was not found."""
-        wanted = f"a coverage of {self._goal / self._whole:.2%}"
+        wanted = f"a coverage of {self._share:.2%}"
         if incumbent.proven:
             return (
                 f"{wanted} cannot be reached: no placement covers more than "
@@ -133,7 +134,9 @@ class _Cheapest:
         r"""Return a price below which no placement reaches the goal.
 
         With a multiplier :math:`μ > 0` of the price a placement of price P has at most the value :math:`L + μ P`, so
-        that :math:`P \ge (goal - L) / μ`. The multiplier is the one for the price so far, in turn (Newton's method).
+        that :math:`P \ge (goal - L) / μ`. The bound at the budget B is :math:`L + μ B`, which gives the price as
+        :math:`B - (bound - goal) / μ`. Each step takes the multiplier of the bound at the price of the last one
+        (Newton's method).
         """
         instance, goal = self._instance, self._goal
         block, every, none = instance.blocks[0], np.arange(len(instance)), np.zeros(0, dtype=np.int64)
@@ -158,8 +161,12 @@ class _Cheapest:
             least = math.ceil(least / single * (1 - TIE_TOLERANCE)) * single
         return least
 
-    def _finished(self, chosen: Integer, least: float) -> Generator[Progress, None, Placement]:
-        """Return the placement of largest coverage among those as cheap as a given one."""
+    def _finished(self, chosen: Integer, least: float, *, proven: bool) -> Generator[Progress, None, Placement]:
+        """Return the placement of largest coverage among those as cheap as a given one.
+
+        ``least`` is a price below which none reaches the goal, and ``proven`` says that none is cheaper, or has fewer
+        sensors where all prices are equal.
+        """
         problem, instance, work = self._problem, self._instance, self._work
         price = math.fsum(instance.price[chosen])
         same = replace(instance, count=len(chosen)) if self._equal_prices else replace(instance, budget=price)
@@ -169,8 +176,8 @@ class _Cheapest:
         solver = yield from search_and_prove(incumbent, start, self._solver, instance.original[chosen])
         kept = incumbent.chosen
         cost = math.fsum(instance.price[kept])
-        optimal = least >= cost * (1 - 3 * TIE_TOLERANCE)
-        notes = [] if optimal else [UNPROVEN_PRICE]
+        optimal = proven or (cost > 0 and least >= cost * (1 - 3 * TIE_TOLERANCE))
+        notes = [] if optimal else [UNPROVEN_PRICE if cost > 0 else UNPROVEN_NUMBER]
         if not incumbent.proven:
             more = (incumbent.bound - incumbent.value) * instance.unit / math.fsum(problem.weights)
             points = math.ceil(1000 * more - 1e-9) / 10

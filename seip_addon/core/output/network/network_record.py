@@ -141,10 +141,11 @@ class NetworkRecord:
         """Certificate as a sentence."""
         money = f"${self.budget_usd:,.0f}"
         if self.goal is not None:
-            whole = f"{self.goal:.0%} of the road at every site"
+            whole = f"{100 * self.goal:g}% of the road at every site"
             if self.least_usd >= self.price_usd * (1.0 - PROVEN):
                 return f"Proven: nothing cheaper among these sites and candidates sees {whole}."
-            return f"Nothing for less than ${self.least_usd:,.0f} sees {whole}: at most {self.saving:.2%} can be saved."
+            least, saving = math.floor(self.least_usd + 1e-6), math.ceil(1e4 * self.saving - 1e-6) / 100
+            return f"Nothing for less than ${least:,} sees {whole}: at most {saving:.2f}% can be saved."
         use = f"Proven: no other use of {money} among these sites and candidates"
         if self.criterion == "road":
             most = "" if self.gap <= PROVEN else f" than {math.ceil(self.bound * 1000 - 1e-6) / 10:.1f}%"

@@ -37,7 +37,7 @@ _TOLERANCE = math.radians(3.0)  # elevation by which a unit may exceed its model
 
 @dataclass(frozen=True, eq=False)
 class RayGrid:
-    """Rays of one revolution: c rings of n azimuth steps, ring after ring.
+    """Rays of one revolution: c rings of s azimuth steps, r = c·s rays, ring after ring.
 
     Parameters
     ----------
@@ -93,7 +93,8 @@ def recovered_rays(sweeps: Sequence[NDArray[np.float32]], model: LidarModel, nam
     Raises
     ------
     SeipError
-        There are too few points, they lie on no rings, or the rings are not those of the model.
+        There are too few points, they lie on no rings, the rings are not those of the model, or their azimuths are of
+        more than one revolution.
     """
     if model.rosette is not None:
         raise SeipError(f"{name}: {model.name} has no fixed rays, so its background cannot be learned ray by ray")
@@ -107,7 +108,7 @@ def recovered_rays(sweeps: Sequence[NDArray[np.float32]], model: LidarModel, nam
     _check_rings(rings, ring, elevation, name)
     _check_model(rings, model, name)
     sweep = np.repeat(np.arange(len(sweeps)), [len(points) for points in sweeps])
-    steps = _azimuth_steps(azimuth, sweep * len(rings) + ring)
+    steps = _azimuth_steps(azimuth, sweep * len(rings) + ring, name)
     # Azimuths of a ring are equal modulo the step: the mean of the angles on the circle of one step is its phase.
     turns = np.exp(1j * azimuth * steps)
     mean = np.bincount(ring, turns.real, len(rings)) + 1j * np.bincount(ring, turns.imag, len(rings))
@@ -122,7 +123,8 @@ def _angles(points: NDArray[np.float32]) -> tuple[Float, Float]:
 def _rings(elevation: Float) -> Float:
     """Return the elevations at which points accumulate, ascending."""
     first = elevation.min() - _LEAST_GAP * _BIN
-    count = np.bincount(((elevation - first) / _BIN).astype(np.int64), minlength=1)
+    place = (elevation - first) / _BIN
+    count = np.bincount(place.astype(np.int64))
     reach = 3 * _BLUR
     kernel = np.exp(-0.5 * (np.arange(-reach, reach + 1) / _BLUR) ** 2)
     smooth = np.convolve(np.pad(count.astype(np.float64), reach), kernel, mode="valid")
@@ -132,11 +134,10 @@ def _rings(elevation: Float) -> Float:
     peak = np.flatnonzero((smooth > 0) & (np.argmax(around, axis=1) == _LEAST_GAP))
     peak = peak[smooth[peak] > _LEAST_PEAK * np.median(smooth[peak])]
     # The mean of the points next to a peak is more exact than the middle of its bin.
-    nearest = np.searchsorted((peak[1:] + peak[:-1]) / 2 + 0.5, (elevation - first) / _BIN)
-    close = np.abs((elevation - first) / _BIN - peak[nearest] - 0.5) <= _LEAST_GAP
-    total = np.bincount(nearest[close], elevation[close], len(peak))
-    rings: Float = total / np.maximum(np.bincount(nearest[close], minlength=len(peak)), 1)
-    return np.sort(rings)
+    nearest = np.searchsorted((peak[1:] + peak[:-1]) / 2 + 0.5, place)
+    close = np.abs(place - peak[nearest] - 0.5) <= _LEAST_GAP
+    rings: Float = np.bincount(nearest[close], elevation[close], len(peak)) / np.bincount(nearest[close])
+    return rings
 
 
 def _check_rings(rings: Float, ring: Integer, elevation: Float, name: str) -> None:
@@ -164,7 +165,7 @@ def _check_model(rings: Float, model: LidarModel, name: str) -> None:
         )
 
 
-def _azimuth_steps(azimuth: Float, group: Integer) -> int:
+def _azimuth_steps(azimuth: Float, group: Integer, name: str) -> int:
     """Return the azimuth steps in a full circle, from the fullest groups of points of one ring and one sweep."""
     count = np.bincount(group)
     rings = [np.sort(azimuth[group == one]) for one in np.argsort(-count, kind="stable")[:_STEP_RINGS].tolist()]
@@ -176,9 +177,14 @@ def _azimuth_steps(azimuth: Float, group: Integer) -> int:
     # azimuth of a ring agree, and the sum of their unit vectors is longest: it is a term of the Fourier series of the
     # histogram of azimuths.
     rough = math.tau / float(np.median(gaps))
+    if math.ceil(rough * (1 + _STEP_ERROR)) > _AZIMUTH_BINS // 2:
+        raise SeipError(
+            f"{name} has about {rough:,.0f} azimuths in a revolution, as many revolutions in one sweep have: give each "
+            "revolution on its own"
+        )
     power = np.zeros(_AZIMUTH_BINS // 2 + 1)
     for ring in rings:
-        place = (ring / math.tau * _AZIMUTH_BINS).astype(np.int64) % _AZIMUTH_BINS
+        place = np.floor(ring * (_AZIMUTH_BINS / math.tau)).astype(np.int64) % _AZIMUTH_BINS
         power += np.abs(np.fft.rfft(np.bincount(place, minlength=_AZIMUTH_BINS))) ** 2 / len(ring)
     tried = np.arange(max(1, math.floor(rough * (1 - _STEP_ERROR))), math.ceil(rough * (1 + _STEP_ERROR)) + 1)
     best = int(tried[np.argmax(power[tried])])

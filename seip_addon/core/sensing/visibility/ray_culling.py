@@ -44,15 +44,15 @@ def rays_near(patches: Patches, azimuth: Float, elevation: Float, max_range: flo
     lowest = np.arctan2(bottom, np.where(bottom < 0, near, far))
     highest = np.arctan2(top, np.where(top > 0, near, far))
     with np.errstate(divide="ignore", invalid="ignore"):
-        half = np.arcsin(np.minimum(patches.radius / patches.distance, 1.0))[some]
+        half = np.arcsin(np.minimum(patches.radius / patches.distance, 1.0))[some]  # 0 / 0 is replaced below
     half = np.where(near > 0, half, math.pi)
 
-    # Each patch adds 1 to all cells of its rectangle. With +1 and -1 at the rectangle's four corners, running sums
-    # along both axes give the number of rectangles over each cell, whatever their size. Azimuths take two turns, so
-    # that rectangles across azimuth zero stay whole; both turns are added up at the end.
-    first_row, end_row = _row(lowest, -_MARGIN), _row(highest, _MARGIN) + 1
-    first = np.floor(_turns(patches.azimuth[some] - half) - _MARGIN).astype(np.int64)
-    end = np.floor(_turns(patches.azimuth[some] + half) + _MARGIN).astype(np.int64) + 1
+    # Each patch adds 1 to all cells of its rectangle. With +1 and -1 at the rectangle's four corners (a difference
+    # array), running sums along both axes give the number of rectangles over each cell, whatever their size. Azimuths
+    # take two turns, so that rectangles across azimuth zero stay whole; both turns are added up at the end.
+    first_row, end_row = _elevation_rows(lowest, -_MARGIN), _elevation_rows(highest, _MARGIN) + 1
+    first = np.floor(_azimuth_cells(patches.azimuth[some] - half) - _MARGIN).astype(np.int64)
+    end = np.floor(_azimuth_cells(patches.azimuth[some] + half) + _MARGIN).astype(np.int64) + 1
     end = np.minimum(end, first + _AZIMUTHS)
     shift = first // _AZIMUTHS * _AZIMUTHS
     first, end = first - shift, end - shift
@@ -62,17 +62,17 @@ def rays_near(patches: Patches, azimuth: Float, elevation: Float, max_range: flo
         np.add.at(reached, (row, end), -sign)
     reached = reached.cumsum(axis=0).cumsum(axis=1)
     both = reached[:, :_AZIMUTHS] + reached[:, _AZIMUTHS : 2 * _AZIMUTHS]
-    column = np.floor(_turns(azimuth)).astype(np.int64) % _AZIMUTHS
-    return np.flatnonzero(both[_row(elevation, 0.0), column] > 0)
+    column = np.floor(_azimuth_cells(azimuth)).astype(np.int64) % _AZIMUTHS
+    return np.flatnonzero(both[_elevation_rows(elevation, 0.0), column] > 0)
 
 
-def _turns(azimuth: Float) -> Float:
+def _azimuth_cells(azimuth: Float) -> Float:
     """Return azimuths in cells."""
     cells: Float = azimuth * (_AZIMUTHS / math.tau)
     return cells
 
 
-def _row(elevation: Float, margin: float) -> Integer:
+def _elevation_rows(elevation: Float, margin: float) -> Integer:
     """Return the rows of cells that elevations lie in."""
     row = np.floor((elevation / math.pi + 0.5) * _ELEVATIONS + margin)
     rows: Integer = np.clip(row, 0, _ELEVATIONS - 1).astype(np.int64)

@@ -1,9 +1,8 @@
-"""Procedural street furniture as plain arrays, with few faces and true outlines.
+"""Buildings and street furniture as plain arrays, with few faces and true outlines.
 
-Every solid has its foot at the origin and z up; arms reach along +x. Sizes are in metres.
+Buildings and their windows are in place, in local axes. All other solids have their foot at the origin and z up; arms
+reach along +x. Sizes are in metres.
 """
-
-from collections import Counter
 
 import numpy as np
 import shapely
@@ -36,7 +35,7 @@ def house(outline: shapely.Polygon, base: float, top: float, *, side: str) -> So
     count = len(corners)
     # Edges between two triangles occur once in each direction. Those without the opposite one are the outline and its
     # courtyards, where walls stand; all triangles are counter-clockwise, so that walls face outwards.
-    edges = Counter(edge for face in caps for edge in zip(face, (*face[1:], face[0]), strict=True))
+    edges = dict.fromkeys(edge for face in caps for edge in zip(face, (*face[1:], face[0]), strict=True))
     walls = [(count + a, count + b, b, a) for a, b in edges if (b, a) not in edges]
     floors = [tuple(count + corner for corner in reversed(face)) for face in caps]
     materials = (*([side] * len(walls)), *(["roof"] * len(caps)), *([side] * len(floors)))
@@ -75,8 +74,8 @@ def signal_pole(height: float, arm: float, *, faces_left: bool = True) -> Solid:
     height, arm : float, metres
         Height of the post and length of the arm; a post without an arm has only the low head.
     faces_left : bool
-        Whether the lamps face +y, left of the arm, which is the near side of the junction in right-hand traffic;
-        otherwise they face -y.
+        Whether the lamps face +y, left of the arm: towards drivers on the lane below it where traffic keeps right.
+        Otherwise they face -y.
     """
     shaft = tube(np.array([0, 0, 0]), np.array([0, 0, height]), (0.11, 0.08), "steel")
     low = _signal_head([0, 0.26, min(2.6, height - 0.5)])

@@ -1,5 +1,6 @@
 """The cheapest placement for a share of the weight: its price, its certificate, and reasons why there is none."""
 
+import itertools
 from dataclasses import replace
 
 import numpy as np
@@ -8,7 +9,7 @@ import pytest
 from seip_addon.core.base.acceptance import Acceptance
 from seip_addon.core.base.errors import SeipError
 from seip_addon.core.base.progress import finish
-from seip_addon.core.choosing.placement.cheapest import UNPROVEN_PRICE, cheapest_for_share
+from seip_addon.core.choosing.placement.cheapest import UNPROVEN_NUMBER, UNPROVEN_PRICE, cheapest_for_share
 from seip_addon.core.choosing.placement.search_limits import SolverLimits
 from tests.builders.placement_problems import HALVES, hard_problem, row_problem
 
@@ -67,6 +68,17 @@ def test_unproven_price_has_a_bound_and_a_note(effort):
     assert 0 < short.bound <= longer.objective <= short.objective == short.price
     assert short.gap == pytest.approx((short.price - short.bound) / short.price)
     assert problem.value(short.chosen) >= 0.6 * 300
+
+
+def test_an_unproven_number_of_sensors_that_cost_nothing_has_a_note():
+    problem = hard_problem(60, 300, count=None, prices=np.zeros(60))
+    short = finish(cheapest_for_share(problem, 0.6, SolverLimits(effort=1e-6)))
+    assert (short.status, short.notes[0], short.bound) == ("feasible", UNPROVEN_NUMBER, 0.0)
+    few = hard_problem(8, 40, count=None, prices=np.zeros(8))
+    best = finish(cheapest_for_share(few, 0.3))
+    assert best.status == "optimal"
+    fewer = itertools.combinations(range(8), len(best.chosen) - 1)
+    assert all(few.value(np.array(chosen, dtype=np.int64)) < 0.3 * 40 for chosen in fewer)
 
 
 def test_accepted_search_ends_at_once_with_a_placement_that_reaches_the_share():

@@ -58,6 +58,16 @@ def test_rays_of_every_spinning_sensor_of_the_catalogue_are_recovered(key, how):
     require_recovered(key, *canyon_sweeps(CATALOGUE[key], count=10, **how))
 
 
+def test_many_revolutions_in_one_sweep_are_refused():
+    model = CATALOGUE["vlp16"]
+    azimuth = np.random.default_rng(0).uniform(-math.pi, math.pi, (len(model.elevations), 120_000))
+    elevation = np.broadcast_to(model.elevations[:, None], azimuth.shape)
+    level = 20.0 * np.cos(elevation)
+    points = np.stack((level * np.cos(azimuth), level * np.sin(azimuth), 20.0 * np.sin(elevation)), axis=-1)
+    with pytest.raises(SeipError, match="as many revolutions in one sweep have"):
+        recovered_rays([points.reshape(-1, 3).astype(np.float32)], model, "the recording")
+
+
 @pytest.mark.parametrize("key", few(SOME, 2))
 def test_each_point_belongs_to_its_ray_and_each_ray_has_its_nearest_range(key):
     model = CATALOGUE[key]
