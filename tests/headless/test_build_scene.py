@@ -71,7 +71,7 @@ def test_the_command_line_goes_before_the_site_file(site, road, tmp_path):
         (["{road}", "-o", "{out}.blend"], "no place is named"),
         (["{road}", "--near", "1100", "2000", "--approaches", "50", "-o", "{out}.blend"], "those of a junction"),
         (["{road}", "--near", "1100", "2000", "--level", "9", "-o", "{out}.blend"], "no road '9' at this place"),
-        (["{road}", "--near", "1100", "2000", "-o", "{out}.obj"], r"let it end in \.blend"),
+        (["{road}", "--near", "1100", "2000", "-o", "{out}.obj"], r"does not end in \.blend"),
         (["{site}", "--site", "{site}", "-o", "{out}.blend"], "leave out the other one"),
         (["{road}", "--near", "1100", "2000", "-o", "{road}/out.blend"], "cannot write"),
     ],
