@@ -1,6 +1,6 @@
 """Hostile files of each format, seeded: a reader gives a result or a SeipError, and nothing else.
 
-Numbers of a result are finite and within `core.limits`: an accepted file with any other number is a fault.
+Numbers of a result are finite and within `core.base.limits`: an accepted file with any other number is a fault.
 
     python -m tests.fuzz --count 1000            # of each format
     python -m tests.fuzz map sweep.npz --count 5000 --seed 7

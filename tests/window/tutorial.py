@@ -20,8 +20,9 @@ from typing import Any
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
 import bpy
-from bl_ext.user_default.seip.seip_addon import preferences, scene_status
+from bl_ext.user_default.seip.seip_addon import preferences
 from bl_ext.user_default.seip.seip_addon.panels import placement, results, sidebar
+from bl_ext.user_default.seip.seip_addon.state import scene_status
 from bl_ext.user_default.seip.seip_addon.state.session import SceneState, session
 from bl_ext.user_default.seip.seip_addon.viewport import search
 from driver import Steps, Window, play
