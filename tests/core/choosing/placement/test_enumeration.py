@@ -25,6 +25,6 @@ def test_the_cheapest_placement_for_a_share(seeds):
     check(faults_of_cheapest, seeds)
 
 
-@pytest.mark.parametrize("seeds", parts(18, 150))
+@pytest.mark.parametrize("seeds", parts(12, 150))
 def test_the_best_placement_over_scenarios_and_failures(seeds):
     check(faults_of_risk, seeds)
