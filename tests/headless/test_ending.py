@@ -51,6 +51,8 @@ class Signals:
 
 module, number = sys.argv[1], int(sys.argv[2])
 del sys.argv[1:3]
+if signal.getsignal(number) is signal.SIG_IGN:  # as in a shell's background job, whose processes inherit it
+    signal.signal(number, signal.default_int_handler)
 sys.meta_path.insert(0, Signals())
 main()
 """
