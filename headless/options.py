@@ -28,7 +28,7 @@ _NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
 NUMBER = "number"
 """Name of the types of options that take a number within limits."""
 _ANY = Limits(-1e15, 1e15)
-"""Of options whose own limits are checked where their numbers are used."""
+"""Limits of options whose own are checked where their numbers are used."""
 _MAX_PATH, _MAX_NAME = 4096, 255  # bytes, as Linux has them; others are within these
 
 

@@ -55,7 +55,7 @@ REMOVED: dict[str, str] = {
     "--format opv2v": "use openpcdet, mmdetection3d, kitti or pcd",
     "--format las": "use pcd, and convert its files with PDAL or CloudCompare",
 }
-"""By option, or by option and value as in ``--format opv2v``: what to do instead, as the end of a sentence."""
+"""Advice by option, or by option and value as in ``--format opv2v``, as the end of a sentence."""
 
 
 def check_removed(arguments: Sequence[str], options: Sequence[str]) -> None:

@@ -28,7 +28,7 @@ NO_MATCH = -1  # in place of the index of a detection or a road user
 
 @dataclass(frozen=True)
 class Rule:
-    """Which road users count, and how much a detection must overlap one to match it.
+    """Rule for the road users that count, and for the overlap at which a detection matches one.
 
     Parameters
     ----------

@@ -14,7 +14,7 @@ from .settings import NetworkSettings
 OUTPUT_STRIDE = 2  # pillars along a side of a cell of the feature map
 
 NORMALISATION_EPSILON, NORMALISATION_MOMENTUM = 1e-3, 0.03
-"""Of batch normalisation: as published, but with running means that keep up with a short training."""
+"""Constants of batch normalisation: as published, but with running means that keep up with a short training."""
 
 
 class PillarEncoder(nn.Module):

@@ -33,7 +33,7 @@ RULES = {
     "bev_0.7_parked": Rule(parked=True),
     **dict(_of_class(name) for name in CLASS_CATEGORIES),
 }
-"""How average precision is taken; the first is the study's own."""
+"""Rules by which average precision is taken; the first is the study's own."""
 
 MAIN_RULE = next(iter(RULES.values()))
 

@@ -30,7 +30,7 @@ NAMES = {
     "motorcycle_bicycle_0.5": "Two-wheelers",
     "pedestrian_0.5": "Pedestrians",
 }
-"""Of road users, by the rule that average precision is taken by."""
+"""Names of road users by the rule that average precision is taken by."""
 MEANING = (
     "AP, average precision, is 100% where every road user is found and nothing else is reported. A road user is found "
     "where its box and the detected one, seen from above, share 70% of the area that they cover together (50% for "

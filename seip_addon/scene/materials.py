@@ -73,7 +73,7 @@ PAINT_COLOURS = {
     "white": (0.700, 0.700, 0.685),
 }
 COLOURS |= {f"{what} {name}": colour for what in ("paint", "cloth") for name, colour in PAINT_COLOURS.items()}
-"""Of the colours that `core.sensing.traffic.bodies` names, on vehicles and on people."""
+"""The names of colours are those of `core.sensing.traffic.bodies`, on vehicles and on people."""
 
 REFLECTIVITY = {
     "asphalt": 0.17,
@@ -103,7 +103,7 @@ have the default."""
 _OWN = {PREFIX + name: share for name, share in REFLECTIVITY.items()}
 
 VEIL_OPACITY = 0.25
-"""Of areas that mean something and are not there to be seen in a render."""
+"""Opacity of areas that mark something in the viewport and are not rendered."""
 
 ROUGHNESS = {"glass": 0.15, "steel": 0.4, "rim": 0.35, "headlamp": 0.2, "tail lamp": 0.3}
 ROUGHNESS |= {f"paint {name}": 0.35 for name in PAINT_COLOURS}

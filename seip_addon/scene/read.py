@@ -26,7 +26,7 @@ from .materials import reflectivity
 from .named_places import places_of
 
 SHAFT_REACH = 0.5
-"""Of a pole's faces those within this (metres, in plan) of its foot are its shaft: arms may rise above it."""
+"""Metres in plan from a pole's foot within which its faces are its shaft: arms may rise above it."""
 FOUNDATION = 0.5
 """Metres that a pole's faces may reach below its origin, as foundations do; beyond, their lowest point is its foot."""
 SAME_LEVEL = 0.1

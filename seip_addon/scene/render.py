@@ -84,7 +84,7 @@ class Shot:
 
 @dataclass(frozen=True, eq=False)
 class Taken:
-    """How a picture was taken.
+    """Viewpoint of a picture that was taken, and what it hides.
 
     Parameters
     ----------

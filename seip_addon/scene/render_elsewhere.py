@@ -20,7 +20,7 @@ from ..core.site.site import Site
 from .render import RenderedPictures, Taken, labelled_pictures, raw_files, sample_count, shots_of
 
 SAMPLE = re.compile(r"Sample (\d+)/")
-"""How Cycles tells of its progress."""
+"""Words in which Cycles tells of its progress."""
 
 
 def render_elsewhere(

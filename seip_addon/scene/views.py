@@ -15,7 +15,7 @@ CLIP_START, CLIP_END = 0.5, 5000.0
 VIEW_SENSOR = 72.0
 """Millimetres of the longer side of a 3D view's sensor; a camera's is 36 unless it is set."""
 MARGIN = 1.15
-"""Of the distance from which a site fills a view: the sidebar takes a part of it."""
+"""Factor on the distance from which a site fills a view: the sidebar takes a part of it."""
 
 
 def set_up_view(view: bpy.types.SpaceView3D) -> None:

@@ -1,1 +1,1 @@
-"""State of the add-on beside the scene: the session of the open file, and what it follows from."""
+"""State of the add-on beside the scene: the session of the open file, its status, and sensors that are followed."""

@@ -17,7 +17,7 @@ from ..scene.sensors import labelled_sensors
 from .session import session
 
 FILE_VERSION = 1
-"""Of what the add-on keeps with a scene: a file with a higher one was saved by a newer add-on."""
+"""Version of what the add-on keeps with a scene: a file with a higher one was saved by a newer add-on."""
 
 NEWER = "This file was saved by a newer version of SEIP: install that version to go on."
 LINKED = "This scene is linked from another file: open that file to work on it."

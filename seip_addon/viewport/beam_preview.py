@@ -66,7 +66,7 @@ class Preview:
 
     @property
     def tilt(self) -> float:
-        """How far azimuth zero is turned down, radians: zero where that is what single precision makes of it."""
+        """Angle by which azimuth zero points down, radians; 0 where single precision cannot tell it from 0."""
         tilt = math.asin(max(-1.0, min(1.0, -float(self.axes[2, 0]))))
         return tilt if abs(tilt) > UPRIGHT else 0.0
 

@@ -39,7 +39,7 @@ DOT_ROOM, DOT_SPACING = 50.0, 14.0
 """Pixels at the interface's usual scale: side of the square that each junction has on average, otherwise the less
 important ones are left out; and side of a square in which one junction is drawn at most."""
 CORNERS = 24
-"""Of the polygon that stands for a dot."""
+"""Corners of the polygon that stands for a dot."""
 SLACK, LINE, PAD = 4.0, 22.0, 8.0
 """Pixels at the interface's usual scale: beside a dot, height of a line of text, and beside words."""
 STEP = 1.25

@@ -1,4 +1,4 @@
-"""How often a vehicle stands on each target."""
+"""Share of the time for which a vehicle stands on each target."""
 
 from collections.abc import Sequence
 

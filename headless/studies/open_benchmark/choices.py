@@ -1,4 +1,4 @@
-r"""What ways of choosing a placement lose in average precision against the default, and the time that they take.
+r"""Loss in average precision of ways to choose a placement, against the default, and the time that they take.
 
 A placement that is the best of many by measured average precision (AP) owes some of it to chance. Each choice is
 therefore scored on runs of traffic that it did not see. Let :math:`a_p` be the mean AP of the classes with placement p

@@ -1,1 +1,1 @@
-"""What all of the core stands on: errors, limits, arrays, settings, progress and estimates."""
+"""Errors, limits, arrays, settings, progress and estimates, on which all of the core stands."""

@@ -208,7 +208,7 @@ BEAM_ELEVATION = Limits(-89.999, 89.999, "degrees")
 """Elevation of a beam, short of straight up and down, where it has no azimuth."""
 
 BEAM_OFFSET = Limits(-720.0, 720.0, "degrees")
-"""What a channel's azimuth is ahead of the sensor's head: two turns at most."""
+"""Azimuth of a channel ahead of the sensor's head: two turns at most."""
 
 HORIZONTAL_VIEW = Limits(0.001, 360.0, "degrees")
 ACCUMULATION = Limits(0.001, 100.0, "s")
@@ -217,14 +217,14 @@ ACCUMULATION = Limits(0.001, 100.0, "s")
 PRISM_RATE = Limits(0.001, 1_000.0, "Hz")
 PRISM_WEDGE = Limits(0.001, 45.0, "degrees")
 REFRACTIVE_INDEX = Limits(1.001, 4.0)
-"""Of a prism: germanium has 4."""
+"""Refractive index of a prism: germanium has 4."""
 
 GAIN = Limits(1e-3, 1e3)
 """Power received, as a multiple of what the law of detection says."""
 
 RANGE_NOISE = Limits(0.0, 10.0, "m")
 NOISE_GROWTH = Limits(0.0, 0.01, "per metre")
-"""What is added to the range noise for each square metre of the squared range."""
+"""Growth of the range noise for each square metre of the squared range."""
 
 DETECTION_THRESHOLD = Limits(-60.0, 20.0, "(ln of 1/m²)")
 DETECTION_SPREAD = Limits(0.05, 10.0)

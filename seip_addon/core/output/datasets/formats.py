@@ -29,7 +29,7 @@ from ...geometry.orientation import quaternion_of
 from .sample import Sample, TrafficRun, cloud, shortest
 
 Files = dict[str, Callable[[], bytes]]
-"""What gives the bytes of each file, by its path in the folder of a dataset."""
+"""Functions that return the bytes of each file, by its path in the folder of a dataset."""
 Splits = Mapping[str, Sequence[str]]
 """Names of the samples of each split."""
 CLASSES = {
@@ -52,7 +52,7 @@ KITTI_CLASS = {
     "Pedestrian": "Pedestrian",
     "DontCare": "DontCare",
 }
-"""As which of KITTI's classes each is evaluated, which is all that OpenPCDet evaluates a custom dataset by."""
+"""KITTI's class as which each is evaluated: OpenPCDet evaluates a custom dataset by no others."""
 NO_OPENPCDET_LABEL = "0.0 0.0 0.0 1.0 1.0 1.0 0.0 DontCare\n"  # the label of a frame without any
 PLAN_STEP = 6.4  # what the range is a multiple of in plan, metres: 16 pillars of 0.4, 32 of 0.2 or 64 of 0.1 m
 HEIGHT_STEP = 2.0  # what the range is a multiple of in height, metres: 40 voxels of 0.05 m, as networks ask for

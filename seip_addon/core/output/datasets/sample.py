@@ -21,7 +21,7 @@ OUTSIDE = "outside_region"
 NO_CLASS = "no_class"
 TOO_FEW = "too_few_points"
 OUTCOMES = (WRITTEN, OUTSIDE, NO_CLASS, TOO_FEW)
-"""What can become of a label, as the manifest counts it; the first that applies of those after `WRITTEN`."""
+"""Outcomes of a label, as the manifest counts them; the first that applies of those after `WRITTEN`."""
 
 _FILE_NAME = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9_.-]{0,99}")
 

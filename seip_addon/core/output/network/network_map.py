@@ -73,7 +73,7 @@ class NetworkView:
 
     @property
     def shape(self) -> float:
-        """How many times as high as wide the window is."""
+        """Height of the window over its width."""
         return (self.window[3] - self.window[1]) / self.width
 
 

@@ -61,7 +61,7 @@ class Evidence:
 
     @property
     def seen_by(self) -> Integer:
-        """How many sensors see each target, (t,) int64."""
+        """Number of sensors that see each target, (t,) int64."""
         times: Integer = self.site.seen.sum(axis=0, dtype=np.int64)
         return times
 

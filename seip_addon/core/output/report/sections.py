@@ -77,7 +77,7 @@ LEAST_TILT = 0.05  # degrees, below which a sensor is upright
 MIN_DIFFERENCE = 1e-6  # share of the road by which two coverages differ at least; records have nine digits
 FOR_RETURNS = " for returns from road users"
 POSE_ERRORS = "with errors of"
-"""How the note begins that says what pose errors cost."""
+"""Beginning of the note on the cost of pose errors."""
 CAPTIONS = {
     "spread.png": "Coverage over draws of pose errors that were not used for choosing.",
     "blame.png": "What each sensor's errors, and each kind of error, cost on average.",

@@ -7,7 +7,7 @@ from ...storage.json_dataclass import read_record
 
 SCHEMA = "seip-detection/1"
 RECORDING_SCHEMA = "seip-recording/2"
-"""Of a ``detection.json`` on the recording of real sensors."""
+"""Schema of a ``detection.json`` on the recording of real sensors."""
 MAIN_RULE = "bev_0.7"
 """Counts all road users; in every record."""
 FORMATS = ("kitti", "openpcdet")

@@ -214,7 +214,7 @@ class RecordedGreedy:
 
 @dataclass(frozen=True)
 class RecordedCounts:
-    """How many targets, positions and poses there were, and how many candidates were dropped, by reason."""
+    """Numbers of targets, positions and poses, and of candidates that were dropped, by reason."""
 
     targets: int
     targets_central: int

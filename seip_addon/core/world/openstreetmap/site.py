@@ -250,7 +250,7 @@ def _network(
 
 @dataclass(frozen=True, eq=False)
 class _Extent:
-    """What belongs to a place, in map coordinates.
+    """Extent of a place: its junctions and areas, in map coordinates.
 
     Parameters
     ----------
