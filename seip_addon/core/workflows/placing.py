@@ -14,6 +14,7 @@ from ..base.errors import SeipError
 from ..base.progress import Progress
 from ..choosing.placement.cheapest import UNPROVEN_PRICE, cheapest_for_share
 from ..choosing.placement.deployment import Deployment, deploy
+from ..choosing.placement.instance import make_instance
 from ..choosing.placement.objective import (
     ACCEPTED_MESSAGE,
     CHOSEN_FOR,
@@ -30,7 +31,7 @@ from ..choosing.placement.returns_summary import ReturnsPoint
 from ..choosing.placement.risk import NOMINAL, Risk
 from ..choosing.placement.scenarios import Scenarios
 from ..choosing.placement.search_limits import DEFAULT_LIMITS, SolverLimits
-from ..choosing.placement.solver import UNPROVEN, front_of, solve, solve_greedy
+from ..choosing.placement.solver import UNPROVEN, front_of, solve_greedy, solve_instance
 from ..choosing.robustness.comparison import Comparison
 from ..choosing.robustness.gain_band import with_gain_band
 from ..choosing.robustness.pose_study import pose_study
@@ -70,8 +71,9 @@ def optimise(
         placement = yield from cheapest_for_share(problem, objective.coverage, limits, problem.describe_road)
         greedy = None
     else:
-        placement = yield from solve(problem, limits, describe=problem.describe_road)
-        greedy = solve_greedy(problem)
+        instance = make_instance(problem)
+        placement = yield from solve_instance(problem, instance, limits, describe=problem.describe_road)
+        greedy = solve_greedy(problem, instance)
     deployment = deploy(site, models, visible[placement.chosen], placement.chosen)
     return Solution(with_count(objective, site), placement, greedy, deployment)
 

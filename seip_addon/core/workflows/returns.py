@@ -14,6 +14,7 @@ from ..base.arrays import Float, Integer
 from ..base.errors import SeipError
 from ..base.progress import Progress
 from ..choosing.placement.concave import LOG_RETURNS
+from ..choosing.placement.instance import make_instance
 from ..choosing.placement.objective import (
     CHOSEN_FOR,
     Objective,
@@ -25,7 +26,7 @@ from ..choosing.placement.objective import (
 from ..choosing.placement.problem import Placement, PlacementProblem
 from ..choosing.placement.returns_summary import ENOUGH_RETURNS, CrossingReturns, ReturnsSummary
 from ..choosing.placement.search_limits import SolverLimits
-from ..choosing.placement.solver import solve, solve_greedy
+from ..choosing.placement.solver import solve_greedy, solve_instance
 from ..sensing.returns.expected_returns import expected_returns
 from ..sensing.returns.occlusion import returns_in_traffic
 from ..sensing.returns.returns_grid import ReturnsGrid, returns_key, stored_returns
@@ -172,9 +173,9 @@ def place_by_returns(survey: Survey, objective: Objective, limits: SolverLimits)
     """
     returns = yield from survey_returns(survey, objective)
     problem = returns.problem()
-
-    placement = yield from solve(problem, limits, describe=returns.describe)
-    return returns.solution(survey, placement, solve_greedy(problem))
+    instance = make_instance(problem)
+    placement = yield from solve_instance(problem, instance, limits, describe=returns.describe)
+    return returns.solution(survey, placement, solve_greedy(problem, instance))
 
 
 def crossing_returns(survey: Survey, solution: Solution) -> tuple[CrossingReturns, ...]:

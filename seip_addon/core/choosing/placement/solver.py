@@ -170,15 +170,20 @@ def placement_of(problem: PlacementProblem, incumbent: Incumbent, solver: str) -
     )
 
 
-def solve_greedy(problem: PlacementProblem) -> Placement:
+def solve_greedy(problem: PlacementProblem, instance: Instance | None = None) -> Placement:
     """Choose greedily, without swaps and without a bound.
+
+    Parameters
+    ----------
+    instance : Instance, optional
+        The problem reduced by `make_instance`, if it is there already.
 
     Raises
     ------
     SeipError
         The constraints cannot be met together, or no candidate adds anything.
     """
-    incumbent = Incumbent(make_instance(problem), Work(math.inf))
+    incumbent = Incumbent(make_instance(problem) if instance is None else instance, Work(math.inf))
     search = Search(incumbent, finish(starting_choice(problem, incumbent.instance, "auto")))
     for power in search.powers:
         incumbent.offer(finish(search.filled(search.start, power)))
