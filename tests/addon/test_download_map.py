@@ -7,12 +7,11 @@ from types import SimpleNamespace
 import bpy
 import pytest
 
-from seip_addon import preferences
 from seip_addon.core.workflows.site_building import SiteRequest, site_source
-from seip_addon.panels import site as site_panel
+from seip_addon.panel import preferences, scene_status
+from seip_addon.panel import site as site_panel
+from seip_addon.panel.session import Background
 from seip_addon.scene import contract
-from seip_addon.state import scene_status
-from seip_addon.state.background import Background
 from tests.builders.drawn_layout import DrawnLayout
 from tests.builders.osm_text import Extract, crossing
 from tests.builders.overpass_server import DATE, Answer, overpass_server, overpass_xml

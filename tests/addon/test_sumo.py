@@ -6,10 +6,9 @@ from types import SimpleNamespace
 import bpy
 import pytest
 
-from seip_addon import preferences
 from seip_addon.core.programs import sumo_programs
 from seip_addon.core.programs.sumo_installation import SUMO_VERSION, sumo_size
-from seip_addon.panels import site, sumo
+from seip_addon.panel import preferences, site
 from tests.builders.drawn_layout import DrawnLayout
 from tests.builders.osm_text import crossing
 from tests.builders.sumo_wheel import write_programs, write_wheel
@@ -112,7 +111,7 @@ def test_after_the_installation_nothing_is_missing(chosen, tmp_path):
     layout = drawn(site.draw, bpy.context)
     assert preferences.NO_SUMO not in layout.text
     assert "seip.install_sumo" not in {name for name, _ in layout.operators}
-    status = drawn(sumo.draw_status)
+    status = drawn(preferences.draw_status)
     assert f"SUMO{SUMO_VERSION}in{where / 'bin'}" in "".join(status.text.split())
     assert not status.operators
     chosen.seip.site.junction = chosen.seip.site.junctions[0].name
@@ -122,6 +121,6 @@ def test_after_the_installation_nothing_is_missing(chosen, tmp_path):
 
 def test_a_sumo_that_does_not_start_can_be_replaced(scene, machine, tmp_path):
     write_programs(tmp_path / "own" / SUMO_VERSION, script="echo 'libGL.so.1 is missing' >&2; exit 127")
-    status = drawn(sumo.draw_status)
+    status = drawn(preferences.draw_status)
     assert "libGL.so.1 is missing" in status.text
     assert ("seip.install_sumo", BUTTON) in status.operators

@@ -20,11 +20,8 @@ from typing import Any
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
 import bpy
-from bl_ext.user_default.seip.seip_addon import preferences
-from bl_ext.user_default.seip.seip_addon.panels import placement, results, sidebar
-from bl_ext.user_default.seip.seip_addon.state import scene_status
-from bl_ext.user_default.seip.seip_addon.state.session import SceneState, session
-from bl_ext.user_default.seip.seip_addon.viewport import search
+from bl_ext.user_default.seip.seip_addon.panel import layout, overlays, placement, preferences, scene_status
+from bl_ext.user_default.seip.seip_addon.panel.session import SceneState, session
 from driver import Steps, Window, play
 from mathutils import Vector
 
@@ -42,7 +39,7 @@ def _heard(sentence: Callable[..., None]) -> Callable[..., None]:
     return draw_and_note
 
 
-for module in (placement, results, sidebar):
+for module in (placement, layout):
     module.draw_sentence = _heard(module.draw_sentence)
 
 OUT = Path(sys.argv[sys.argv.index("--") + 1]).resolve()
@@ -226,8 +223,6 @@ def _report(window: Window) -> Steps:
     poses = {row["chosen"]: row["pose"] for row in rows if row["chosen"]}
     assert poses == {line["id"]: "" if line["pose"] is None else str(line["pose"]) for line in record["sensors"]}
     yield from window.picture("8-report")
-    yield from window.click("seip.save_picture(")
-    yield from window.until((OUT / "placement.png").exists, 60)
     bpy.context.window_manager.seip_sections.export = False
 
 
@@ -351,7 +346,7 @@ def _known() -> SceneState | None:
 
 def _drawn() -> bool:
     """Tell whether the best placement so far is drawn in the view."""
-    return search.NAME in session.overlays.get(_scene().session_uid, {})
+    return overlays.find(_scene(), placement.SEARCH) is not None
 
 
 def _sensors() -> list[bpy.types.Object]:

@@ -9,7 +9,7 @@ from seip_addon.core.base.progress import Pace, Progress
 from seip_addon.core.sensing.lidar.catalogue import load_catalogue
 from seip_addon.core.sensing.visibility.grid import compute_visibility
 from seip_addon.core.sensing.visibility.settings import VisibilitySettings
-from seip_addon.state.background import Background
+from seip_addon.panel.session import Background
 from tests.builders.synthetic_junction import junction_site
 
 SITE = junction_site(positions=80, heights=[4.0, 6.0, 8.0], spacing=1.0)

@@ -1,0 +1,218 @@
+"""The sidebar: three steps to a placement and what follows, its properties, and the entries in Blender's menus."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import bpy
+from bpy.props import BoolProperty, CollectionProperty, IntProperty, PointerProperty
+
+from . import (
+    detection,
+    export,
+    placement,
+    results,
+    scans,
+    scene_status,
+    sensors,
+    simulation,
+    site,
+    site_check,
+    traffic,
+    verification,
+)
+from .coverage import SEIP_PG_view
+from .detection import SEIP_PG_detection
+from .layout import Sidebar, Status, draw_sections
+from .objective import SEIP_PG_goal
+from .results import SEIP_PG_placement, SEIP_PG_result
+from .scene_status import FILE_VERSION
+from .simulation import SEIP_PG_simulation
+from .site import EXTRACTS, SEIP_PG_site
+from .survey import SEIP_PG_survey
+from .traffic import SEIP_PG_traffic
+from .verification import SEIP_PG_verification
+
+AUTOMATIC, CLOSED, OPEN = -1, 0, 1
+"""States of a step: open while it is the current one, or as the user left it."""
+STEPS: tuple[tuple[str, ...], ...] = (
+    ("load_example", "download_map", "choose_map", "build_site", "check_site"),
+    ("add_catalogue", "preview_beams", "solve_placement"),
+    ("evaluate_sensors", "export_result"),
+    ("colour_coverage",),
+    ("load_traffic", "simulate_traffic", "scan_frame", "write_dataset", "detect"),
+    ("stop",),
+)
+"""Operators of the menu, by step of the work."""
+
+
+def _step(name: str, title: str) -> Any:  # noqa: ANN401 -- what Blender makes of a property
+    """Return the property of a step that is open while it is the current one, until a user opens or closes it."""
+    stored = f"{name}_state"
+
+    def is_open(own: SEIP_PG_sections) -> bool:
+        state = getattr(own, stored)
+        return bool(state == OPEN or (state == AUTOMATIC and scene_status.current_step(bpy.context.scene) == name))
+
+    def set_open(own: SEIP_PG_sections, value: bool) -> None:  # noqa: FBT001 -- Blender's signature
+        setattr(own, stored, OPEN if value else CLOSED)
+
+    getter: Callable[[SEIP_PG_sections], bool] = is_open
+    return BoolProperty(
+        name=title, description="Show or hide this step", get=getter, set=set_open, options={"SKIP_SAVE"}
+    )
+
+
+def _section(title: str) -> Any:  # noqa: ANN401 -- as above
+    return BoolProperty(name=title, description="Show or hide this section", default=False)
+
+
+class SEIP_PG_sections(bpy.types.PropertyGroup):
+    """Open and closed sections of the sidebar."""
+
+    site_state: IntProperty(default=AUTOMATIC, options={"HIDDEN", "SKIP_SAVE"})
+    sensors_state: IntProperty(default=AUTOMATIC, options={"HIDDEN", "SKIP_SAVE"})
+    placement_state: IntProperty(default=AUTOMATIC, options={"HIDDEN", "SKIP_SAVE"})
+    site: _step("site", "Site")
+    sensors: _step("sensors", "Sensors")
+    placement: _step("placement", "Placement")
+    change_site: _section("Change Site")
+    sources: _section("Surroundings and Terrain")
+    roles: _section("Roles of Objects")
+    contents: _section("Contents")
+    about_sensor: _section("About the Sensor")
+    beams: _section("Beam Preview")
+    numbers: _section("Number of Sensors")
+    details: _section("Details")
+    objective: _section("Objective")
+    rules: _section("Weights and Positions")
+    candidates: _section("Positions, Weather, Price")
+    search: _section("Search")
+    results: _section("Results")
+    view: _section("Coverage and Sight Lines")
+    comparison: _section("Compare")
+    traffic: _section("Traffic and Detection")
+    simulation: _section("Traffic Simulation")
+    scan: _section("Scan")
+    dataset: _section("Dataset")
+    detection: _section("Detection")
+    verification: _section("Verification")
+    export: _section("Export")
+
+    def follow_steps(self) -> None:
+        """Open the current step and close the others, now and from now on."""
+        self.site_state = self.sensors_state = self.placement_state = AUTOMATIC
+
+
+def forget() -> None:
+    """Close all sections but the current step: another file is opened, which may bring its own state."""
+    if isinstance(bpy.data, bpy.types.BlendData):  # Blender shows nobody the open file while it registers an add-on
+        bpy.context.window_manager.property_unset("seip_sections")
+
+
+class SEIP_PG_scene(bpy.types.PropertyGroup):
+    """All that SEIP keeps with a scene."""
+
+    version: IntProperty(name="Version", default=FILE_VERSION, options={"HIDDEN"})
+    site: PointerProperty(type=SEIP_PG_site)
+    survey: PointerProperty(type=SEIP_PG_survey)
+    goal: PointerProperty(type=SEIP_PG_goal)
+    result: PointerProperty(type=SEIP_PG_result)
+    kept: CollectionProperty(type=SEIP_PG_placement)
+    active_kept: IntProperty(name="Kept Placement", description="Placement to compare the present one with")
+    view: PointerProperty(type=SEIP_PG_view)
+    traffic: PointerProperty(type=SEIP_PG_traffic)
+    simulation: PointerProperty(type=SEIP_PG_simulation)
+    detection: PointerProperty(type=SEIP_PG_detection)
+    verification: PointerProperty(type=SEIP_PG_verification)
+
+
+class SEIP_PT_steps(Sidebar, bpy.types.Panel):
+    """Panel: the three steps to a placement, each with its status, and what follows; the current step is open."""
+
+    bl_label = "Sensor Placement"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Draw the sections."""
+        scene, layout = context.scene, self.layout
+        steps = {"site": site.draw, "sensors": sensors.draw, "placement": placement.draw}
+        parts = {"site": site_check, "sensors": sensors, "placement": placement}
+        draw_sections(layout, steps, context, {name: part.status(scene) for name, part in parts.items()})
+        layout.separator(type="LINE")
+        changed = scene_status.has_placement(scene) and scene_status.is_changed(scene)
+        states = {"results": Status(changed), "traffic": Status(any(one.changed for one in _traffic(scene).values()))}
+        after = {"results": results.draw, "traffic": draw_traffic, "export": export.draw}
+        draw_sections(layout, after, context, states)
+
+
+def draw_traffic(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+    """Draw traffic, and the sections of all that is done with it."""
+    traffic.draw(layout, context)
+    parts = {
+        "simulation": simulation.draw,
+        "scan": scans.draw_scan,
+        "dataset": scans.draw_dataset,
+        "detection": detection.draw,
+        "verification": verification.draw,
+    }
+    draw_sections(layout, parts, context, _traffic(context.scene))
+
+
+def _traffic(scene: bpy.types.Scene) -> dict[str, Status]:
+    """Return the status of each section below traffic that has one."""
+    parts = {"simulation": simulation, "detection": detection, "verification": verification}
+    return {name: part.status(scene) for name, part in parts.items()}
+
+
+class SEIP_FH_map(bpy.types.FileHandler):
+    """A map or an extract that is dropped into a 3D view; Blender matches only the last suffix of a name."""
+
+    bl_label = "OpenDRIVE or OpenStreetMap"
+    bl_import_operator = "seip.choose_map"
+    bl_file_extensions = ".xodr;.osm;.gz"
+
+    @classmethod
+    def poll_drop(cls, context: bpy.types.Context) -> bool:
+        """Return whether this is a 3D view."""
+        return context.area is not None and context.area.type == "VIEW_3D"
+
+
+class SEIP_MT_main(bpy.types.Menu):
+    """Menu with the operators of the sidebar, by name."""
+
+    bl_label = "SEIP"
+
+    def draw(self, _context: bpy.types.Context) -> None:
+        """Draw the steps in their order."""
+        layout = self.layout
+        layout.operator_context = "INVOKE_DEFAULT"
+        for step in STEPS:
+            for operator in step:
+                layout.operator(f"seip.{operator}")
+            layout.separator()
+
+
+def draw_import(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
+    """Draw what File ▸ Import gets."""
+    for text, pattern in (("OpenDRIVE (.xodr)", "*.xodr"), ("OpenStreetMap (.osm)", EXTRACTS)):
+        menu.layout.operator("seip.choose_map", text=text).filter_glob = pattern
+
+
+def draw_add(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
+    """Draw what the menu Add gets."""
+    menu.layout.operator_context = "INVOKE_DEFAULT"
+    menu.layout.operator("seip.load_example", text="SEIP Example")
+    menu.layout.operator_menu_enum("seip.add_area", "role", text="SEIP Area")
+
+
+def draw_object(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
+    """Draw what the menu Object gets."""
+    menu.layout.menu(SEIP_MT_main.__name__)
+
+
+MENUS = (("TOPBAR_MT_file_import", draw_import), ("VIEW3D_MT_add", draw_add), ("VIEW3D_MT_object", draw_object))
+PROPERTIES = (
+    (bpy.types.Scene, "seip", PointerProperty(type=SEIP_PG_scene)),
+    (bpy.types.WindowManager, "seip_sections", PointerProperty(type=SEIP_PG_sections)),
+)
