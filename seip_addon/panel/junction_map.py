@@ -23,7 +23,7 @@ from .session import session
 from .work import Outcome
 
 HELP = (
-    *("Click a junction", "Esc: cancel", "Enter: list of names"),
+    *("Click a junction", "Esc: cancel", "Enter: list in the sidebar"),
     *("Wheel: zoom", "Drag: pan", "Home: all"),
 )
 ESSENTIAL = 3
@@ -381,7 +381,6 @@ class SEIP_OT_pick_junction(bpy.types.Operator):
             return {"CANCELLED"}
         if action == "PICK" and self._map.hovered is not None:
             context.scene.seip.site.junction = self._map.names[self._map.hovered]
-        bpy.ops.seip.choose_place("INVOKE_DEFAULT")
         return {"FINISHED"}
 
     def cancel(self, context: bpy.types.Context) -> None:

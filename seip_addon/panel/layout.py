@@ -91,17 +91,15 @@ def draw_lines(layout: bpy.types.UILayout, lines: list[str], icon: str = "NONE",
         column.label(text=line, icon=icon if number == 0 else rest, translate=False)
 
 
-def wrapped(text: str, taken: float, width: float | None = None) -> list[str]:
+def wrapped(text: str, taken: float) -> list[str]:
     """Return the lines of a text in the sidebar.
 
     Parameters
     ----------
     taken : float, pixels at the usual scale of the interface
         Width of the sidebar that the text cannot use.
-    width : float, pixels at the usual scale of the interface, optional
-        Width in place of that of the region.
     """
-    room = (sidebar_width() if width is None else width) - taken
+    room = sidebar_width() - taken
     lines: list[str] = []
     for word in text.split():
         longer = f"{lines[-1]} {word}" if lines else word
@@ -147,13 +145,10 @@ def draw_run(
     operator: str,
     icon: str = "NONE",
     text: str | None = None,
-    *,
-    in_one_row: bool = False,
 ) -> None:
     """Draw an operator's button, or in its place the progress of its work; the button of the next step is emphasised.
 
-    The progress is a row that takes the place of the button, with the time in its bar, and a sentence below unless
-    there is only one row.
+    The progress is a row that takes the place of the button, with the time in its bar, and a sentence below.
     """
     running = session.running
     row = layout.row(align=True)
@@ -166,8 +161,6 @@ def draw_run(
     if is_searching():
         row.operator("seip.accept", text="", icon="CHECKMARK")
     row.operator("seip.stop", text="", icon="X")
-    if in_one_row:
-        return
     line = progress_line(progress)
     draw_sentence(layout, f"{line[:1].upper()}{line[1:]}")
 

@@ -184,20 +184,15 @@ def draw_preferences(layout: bpy.types.UILayout) -> None:
 
 
 def draw_status(layout: bpy.types.UILayout) -> None:
-    """Draw the SUMO in use, or the button that installs it."""
+    """Draw the SUMO in use, or the button that installs it, and why it cannot."""
     status, works = sumo_status()
     draw_sentence(layout, f"{status}.", icon="CHECKMARK" if works else "ERROR")
-    if not works:
-        draw_installation(layout)
-
-
-def draw_installation(layout: bpy.types.UILayout, *, in_one_row: bool = False) -> None:
-    """Draw the button that installs SUMO, and why it cannot where there is more than one row."""
-    reason = "" if in_one_row else why_no_installation()
-    if reason:
+    if works:
+        return
+    if reason := why_no_installation():
         draw_sentence(layout, f"{reason}.", icon="INFO")
     text = f"{SEIP_OT_install_sumo.bl_label} ({sumo_size().download} MB)"
-    draw_run(layout, "seip.install_sumo", icon="IMPORT", text=text, in_one_row=in_one_row)
+    draw_run(layout, "seip.install_sumo", icon="IMPORT", text=text)
 
 
 class SEIP_PG_catalogue_file(bpy.types.PropertyGroup):

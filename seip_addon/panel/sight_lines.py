@@ -86,10 +86,8 @@ def draw(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     """Draw the button that shows the sight lines of the active sensor."""
     column = layout.column(align=True)
     column.label(text="Sight Lines")
-    overlay = overlays.find(context.scene, NAME)
-    row = column.row(align=True)
     label = context.scene.seip.result.active_label() or "Sensor"
-    draw_run(row, "seip.show_sight_lines", icon="LIGHT_SPOT", text=f"From {label}", in_one_row=True)
-    if overlay is not None:
-        row.operator("seip.hide_overlay", text="", icon="X").name = NAME
+    draw_run(column, "seip.show_sight_lines", icon="LIGHT_SPOT", text=f"From {label}")
+    if overlays.find(context.scene, NAME) is not None:
+        column.operator("seip.hide_overlay", icon="X").name = NAME
     draw_reason(column, no_placement(context.scene))

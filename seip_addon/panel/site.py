@@ -25,16 +25,12 @@ from ..scene.startup import remove_startup_objects
 from ..scene.views import frame_site
 from . import overlays, preferences, scene_status, sensors, traffic
 from .layout import (
-    ICON,
-    MARGIN,
-    draw_lines,
     draw_path,
     draw_run,
     draw_sections,
     draw_sentence,
     draw_settings,
     settings_column,
-    wrapped,
 )
 from .object_roles import ROLE_ITEMS, WritesScene, draw_roles
 from .preferences import overpass, sumo_folders
@@ -53,10 +49,6 @@ NO_NEW_SITE = "Paste latitude and longitude, or a link of a web map, into New Si
 NO_PLACE = "Choose a junction, or give latitude and longitude"
 COPIED = ("source", "position", "region_shape", "radius", "osm", "terrain", "terrain_epsg")
 """Properties of a choice that a site in a new scene takes over."""
-DIALOG_WIDTH = 420
-"""Width of the dialog of an import, pixels at the usual scale of the interface."""
-MESSAGE_LINES = 5
-"""Lines of that dialog for a message: as many as the longest takes."""
 
 
 class SEIP_PG_junction(bpy.types.PropertyGroup):
@@ -194,13 +186,14 @@ class SEIP_OT_choose_map(WritesScene, LongWork, bpy.types.Operator):
             self._ask(site, found)
 
     def _ask(self, site: SEIP_PG_site, found: SitePlaces) -> None:
-        """Ask for the place: on the map, or in a dialog where a description or the only junction gives it."""
+        """Ask for the place in the sidebar; where a file has several junctions, on the map."""
+        sections = bpy.context.window_manager.seip_sections
+        sections.site = sections.change_site = True
+        overlays.open_sidebar(bpy.context.window)
         if len(found.places) == 1 and not site.is_described():
             site.junction = found.places[0].name
         elif not site.is_described() and bpy.ops.seip.pick_junction.poll():
             bpy.ops.seip.pick_junction("INVOKE_DEFAULT")
-            return
-        bpy.ops.seip.choose_place("INVOKE_DEFAULT")
 
 
 def _list_places(site: SEIP_PG_site, source: str, places: SitePlaces) -> None:
@@ -404,46 +397,6 @@ def _draw_download(layout: bpy.types.UILayout, site: SEIP_PG_site) -> None:
         if reason:
             draw_sentence(layout, f"{reason}.", icon="ERROR")
         draw_run(layout, "seip.download_map", icon="WORLD")
-
-
-class SEIP_OT_choose_place(bpy.types.Operator):
-    """Choose the junction of the site, and the length of its streets"""
-
-    bl_idname = "seip.choose_place"
-    bl_label = "Import Site"
-    bl_options = {"INTERNAL"}
-
-    def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> Outcome:
-        """Ask."""
-        outcome: Outcome = context.window_manager.invoke_props_dialog(
-            self, width=DIALOG_WIDTH, confirm_text=SEIP_OT_build_site.bl_label
-        )
-        return outcome
-
-    def draw(self, context: bpy.types.Context) -> None:
-        """Draw the file, the choice of the place, and what is missing: no choice adds or removes a row."""
-        site, layout = context.scene.seip.site, self.layout
-        layout.label(text=bpy.path.basename(site.source), icon="FILE", translate=False)
-        _draw_place(layout, site)
-        _draw_sources(layout, site)
-        if site.is_extract() and preferences.sumo() is None:
-            preferences.draw_installation(layout, in_one_row=True)
-        elif site.is_extract():
-            layout.label(text="SUMO lays out the streets.", icon="CHECKMARK")
-        missing = missing_for_build(context.scene)
-        if missing == preferences.NO_SUMO and preferences.why_no_installation():
-            missing = f"{missing}. {preferences.why_no_installation()}"
-        text, icon = (f"{missing}.", "ERROR") if missing else (_place_text(site), "INFO")
-        lines = wrapped(text, MARGIN + ICON, DIALOG_WIDTH)
-        draw_lines(layout, lines + [""] * (MESSAGE_LINES - len(lines)), icon)
-
-    def execute(self, context: bpy.types.Context) -> Outcome:
-        """Build the site, or show the dialog again, with what is missing."""
-        if missing_for_build(context.scene) and not bpy.app.background:
-            bpy.ops.seip.choose_place("INVOKE_DEFAULT")
-            return {"CANCELLED"}
-        bpy.ops.seip.build_site("INVOKE_DEFAULT")
-        return {"FINISHED"}
 
 
 def _draw_place(layout: bpy.types.UILayout, site: SEIP_PG_site) -> None:

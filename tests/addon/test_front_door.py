@@ -181,9 +181,10 @@ def test_the_header_of_some_section_shows_the_work_of_each_operator(scene):
 
 
 @pytest.mark.parametrize("width", [90.0, 160.0, 420.0])
-def test_no_line_is_wider_than_its_room_and_no_letter_of_a_path_is_lost(scene, width):
+def test_no_line_is_wider_than_its_room_and_no_letter_of_a_path_is_lost(scene, width, monkeypatch):
     text = "written to /srv/somebody/a/very/long/path_that_has_no_blank/and-goes-on/result/placement.json at once"
-    lines = layout_parts.wrapped(text, 30.0, width)
+    monkeypatch.setattr(layout_parts, "sidebar_width", lambda: width)
+    lines = layout_parts.wrapped(text, 30.0)
     assert max(map(layout_parts.text_width, lines)) <= width - 30.0
     assert "".join(lines).replace(" ", "") == text.replace(" ", "")
 
