@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -10,10 +10,9 @@ import blf
 import bpy
 import gpu
 import numpy as np
+from bpy_extras.view3d_utils import location_3d_to_region_2d
 from gpu_extras.batch import batch_for_shader
-from mathutils import Matrix, Vector
 
-from ..core.base.arrays import Float
 from ..core.output.pictures.labels import stack_upwards
 
 TEXT_SIZE, LINE, SWATCH, GAP, MARGIN = 12.0, 20.0, 22.0, 8.0, 14.0  # pixels at the interface's usual scale
@@ -55,41 +54,26 @@ Box = tuple[float, float, float, float]
 
 
 def free_frame(area: bpy.types.Area, region: bpy.types.Region) -> Box:
-    """Return the free part of a viewport's window, in pixels of that window."""
-    others = [(one.alignment, _box(one)) for one in area.regions if one != region and min(one.width, one.height) > 1]
-    left, bottom, right, top = uncovered(_box(region), others)
-    return left - region.x, bottom - region.y, right - region.x, top - region.y
-
-
-def uncovered(window: Box, others: Iterable[tuple[str, Box]]) -> Box:
-    """Return what is left of a window beside boxes that lie over its edges.
-
-    Parameters
-    ----------
-    others : iterable of (str, Box)
-        Edge at which each box lies (``LEFT``, ``RIGHT``, ``TOP``, ``BOTTOM``), and the box.
-    """
-    left, bottom, right, top = window
-    for edge, box in others:
-        if box[0] >= window[2] or box[2] <= window[0] or box[1] >= window[3] or box[3] <= window[1]:
+    """Return the part of a viewport's window that no header, toolbar or sidebar covers, in pixels of that window."""
+    left, bottom, right, top = 0, 0, region.width, region.height
+    for one in area.regions:
+        x, y = one.x - region.x, one.y - region.y
+        is_over = -one.width < x < region.width and -one.height < y < region.height
+        if one == region or min(one.width, one.height) <= 1 or not is_over:
             continue
-        if edge == "LEFT":
-            left = max(left, box[2])
-        elif edge == "RIGHT":
-            right = min(right, box[0])
-        elif edge == "TOP":
-            top = min(top, box[1])
-        elif edge == "BOTTOM":
-            bottom = max(bottom, box[3])
+        if one.alignment == "LEFT":
+            left = max(left, x + one.width)
+        elif one.alignment == "RIGHT":
+            right = min(right, x)
+        elif one.alignment == "TOP":
+            top = min(top, y)
+        elif one.alignment == "BOTTOM":
+            bottom = max(bottom, y + one.height)
     return left, bottom, max(left, right), max(bottom, top)
 
 
-def _box(region: bpy.types.Region) -> Box:
-    return region.x, region.y, region.x + region.width, region.y + region.height
-
-
-def placed_legend(blocks: Sequence[Block], frame: Box, scale: float) -> tuple[Box, float]:
-    """Return the box of the legend in the lower right corner of a frame, and the scale at which it fits there.
+def draw_legend(blocks: Sequence[Block], frame: Box, scale: float) -> Box:
+    """Draw the legend in the lower right corner of a frame, smaller where it has no room there; return its box.
 
     Parameters
     ----------
@@ -98,22 +82,15 @@ def placed_legend(blocks: Sequence[Block], frame: Box, scale: float) -> tuple[Bo
     scale : float
         Scale of the interface, and of the legend where there is room.
     """
-    left, bottom, right, top = frame
     wide, tall = _size(blocks, scale)
-    room = max(right - left - 2 * MARGIN * scale, 1.0), max(top - bottom - 2 * MARGIN * scale, 1.0)
+    room = frame[2] - frame[0] - 2 * MARGIN * scale, frame[3] - frame[1] - 2 * MARGIN * scale
     share = min(1.0, room[0] / wide, room[1] / tall)
     if share < 1.0:
-        scale *= max(share, LEAST_SCALE / scale)
+        scale = max(share * scale, LEAST_SCALE)
         wide, tall = _size(blocks, scale)
-    x, y = right - MARGIN * scale, bottom + MARGIN * scale
-    return (x - wide, y, x, y + tall), scale
-
-
-def draw_legend(blocks: Sequence[Block], box: Box, scale: float) -> None:
-    """Draw the legend into its box, see `placed_legend`."""
-    left, bottom, right, top = box
-    blf.size(FONT, TEXT_SIZE * scale)
-    fill(left, bottom, right - left, top - bottom, (PAPER, PAPER))
+    right, bottom = frame[2] - MARGIN * scale, frame[1] + MARGIN * scale
+    left, top = right - wide, bottom + tall
+    fill(left, bottom, wide, tall, (PAPER, PAPER))
     x, y = left + GAP * scale, top - GAP * scale
     for block in blocks:
         y -= LINE * scale
@@ -122,6 +99,7 @@ def draw_legend(blocks: Sequence[Block], box: Box, scale: float) -> None:
             y -= LINE * scale
             _draw_entry(entry, x, y, scale)
         y -= GAP * scale
+    return left, bottom, right, top
 
 
 def _size(blocks: Sequence[Block], scale: float) -> tuple[float, float]:
@@ -163,56 +141,37 @@ def fill(x: float, y: float, width: float, height: float, colours: tuple[Colour,
     gpu.state.blend_set("NONE")
 
 
-def draw_labels(  # what a label must keep off is of several kinds
-    labels: list[Label], to_view: Matrix, size: tuple[int, int], frame: Box, taken: list[Box], scale: float
+def draw_labels(
+    labels: Sequence[Label], context: bpy.types.Context, frame: Box, taken: Sequence[Box], scale: float
 ) -> None:
     """Draw labels above what they name, with a line to it, and no label over another.
 
     Parameters
     ----------
-    to_view : (4, 4) Matrix
-        From the scene's axes to the view's: -1 to 1 after division.
-    size : (width, height) pixels
+    context : bpy.types.Context
+        Of the viewport that is drawn.
     frame : (left, bottom, right, top), pixels
-        Part of the viewport that nothing covers.
-    taken : list of Box
+        Part of the viewport that nothing covers; labels of what is in it are in its width.
+    taken : sequence of Box
         Boxes in the frame over which no label may be.
     scale : float
         Scale of the interface.
     """
     blf.size(FONT, TEXT_SIZE * scale)
-    shown, widths, anchors = [], [], []
+    shown, own = [], []
     for words, place in labels:
-        seen = to_view @ Vector((*place, 1.0))
-        if seen.w <= 0.0:
+        at = location_3d_to_region_2d(context.region, context.region_data, place)
+        if at is None:
             continue  # behind the eye
-        shown.append(words)
-        widths.append(blf.dimensions(FONT, words)[0] + 2 * PAD * scale)
-        anchors.append([(1.0 + seen[axis] / seen.w) / 2.0 * size[axis] for axis in (0, 1)])
-    boxes = label_boxes(np.array(anchors).reshape(-1, 2), np.array(widths), frame, taken, scale)
-    for words, (x, y), (left, bottom, right, top) in zip(shown, anchors, boxes.tolist(), strict=True):
-        fill(x - scale / 2, y, scale, bottom - y, (PAPER, PAPER))
-        fill(left, bottom, right - left, top - bottom, (PAPER, PAPER))
-        write(words, left + PAD * scale, bottom, scale)
-
-
-def label_boxes(anchors: Float, widths: Float, frame: Box, taken: list[Box], scale: float) -> Float:
-    """Return the box of each label, (k, 4): left, bottom, right, top, pixels.
-
-    Labels of what is in the frame are in its width, above what they name, and above taken boxes and other labels.
-
-    Parameters
-    ----------
-    anchors : (k, 2) float64, pixels
-        What the labels name.
-    widths : (k,) float64, pixels
-    """
-    left = anchors[:, 0] - widths / 2.0
-    inside = (anchors[:, 0] >= frame[0]) & (anchors[:, 0] <= frame[2])
-    left = np.where(inside, np.maximum(np.minimum(left, frame[2] - widths), frame[0]), left)
-    bottom, tall = anchors[:, 1] + RISE * scale, TALL * scale
-    own = np.column_stack((left, bottom, widths, np.full(len(left), tall)))
+        wide = blf.dimensions(FONT, words)[0] + 2 * PAD * scale
+        left = at.x - wide / 2.0
+        if frame[0] <= at.x <= frame[2]:
+            left = max(min(left, frame[2] - wide), frame[0])
+        shown.append((words, at))
+        own.append((left, at.y + RISE * scale, wide, TALL * scale))
     others = np.array([(box[0], box[1], box[2] - box[0], box[3] - box[1]) for box in taken]).reshape(-1, 4)
-    bottom = bottom + stack_upwards(own, LABEL_GAP * scale, others)
-    boxes: Float = np.column_stack((left, bottom, left + widths, bottom + tall))
-    return boxes
+    rises = stack_upwards(np.array(own).reshape(-1, 4), LABEL_GAP * scale, others).tolist()
+    for (words, at), (left, bottom, wide, tall), rise in zip(shown, own, rises, strict=True):
+        fill(at.x - scale / 2, at.y, scale, bottom + rise - at.y, (PAPER, PAPER))
+        fill(left, bottom + rise, wide, tall, (PAPER, PAPER))
+        write(words, left + PAD * scale, bottom + rise, scale)

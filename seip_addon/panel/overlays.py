@@ -14,10 +14,9 @@ import bpy
 import gpu
 import numpy as np
 from gpu_extras.batch import batch_for_shader
-from mathutils import Matrix
 from numpy.typing import NDArray
 
-from .legend import Block, Box, Colour, Label, draw_labels, draw_legend, free_frame, placed_legend
+from .legend import Block, Colour, Label, draw_labels, draw_legend, free_frame
 
 TAB = "SEIP"
 DRAWN = 0.5
@@ -115,17 +114,6 @@ def overlays_of(scene: bpy.types.Scene) -> list[Overlay]:
     return [own[name] for name in sorted(own)]
 
 
-def draw_overlays(scene: bpy.types.Scene) -> None:
-    """Draw a scene's overlays into the bound framebuffer, with depth test."""
-    gpu.state.depth_test_set("LESS_EQUAL")
-    gpu.state.blend_set("ALPHA")
-    for overlay in overlays_of(scene):
-        for layer in (*overlay.layers, *overlay.moving()):
-            layer.draw(bpy.context.preferences.system.ui_scale)
-    gpu.state.blend_set("NONE")
-    gpu.state.depth_test_set("NONE")
-
-
 def viewports(windows: Iterable[bpy.types.Window]) -> list[bpy.types.Area]:
     """Return the 3D viewports of windows."""
     areas = (area for window in windows for area in window.screen.areas)
@@ -161,7 +149,7 @@ def _update_handlers() -> None:
     for uid in [uid for uid, own in _shown.items() if not own or uid not in existing]:
         del _shown[uid]
     if _shown and not _handles:
-        for draw, event in ((_draw_view, "POST_VIEW"), (_draw_pixels, "POST_PIXEL")):
+        for draw, event in ((_draw_layers, "POST_VIEW"), (_draw_words, "POST_PIXEL")):
             _handles.append(bpy.types.SpaceView3D.draw_handler_add(draw, (), "WINDOW", event))
     if not _shown:
         while _handles:
@@ -179,43 +167,23 @@ def labels_of(scene: bpy.types.Scene) -> list[Label]:
     return [label for overlay in overlays_of(scene) for label in overlay.labels(scene)]
 
 
-def _draw_view() -> None:
-    draw_overlays(bpy.context.scene)
+def _draw_layers() -> None:
+    """Draw the overlays of the scene, with depth test."""
+    gpu.state.depth_test_set("LESS_EQUAL")
+    gpu.state.blend_set("ALPHA")
+    for overlay in overlays_of(bpy.context.scene):
+        for layer in (*overlay.layers, *overlay.moving()):
+            layer.draw(bpy.context.preferences.system.ui_scale)
+    gpu.state.blend_set("NONE")
+    gpu.state.depth_test_set("NONE")
 
 
-def _draw_pixels() -> None:
-    context = bpy.context
-    region, scale = context.region, context.preferences.system.ui_scale
-    size = (region.width, region.height)
-    frame = free_frame(context.area, region)
-    draw_words(context.scene, context.region_data.perspective_matrix, size, frame, scale)
-
-
-def draw_words(  # where words may be is of several kinds
-    scene: bpy.types.Scene,
-    to_view: Matrix,
-    size: tuple[int, int],
-    frame: Box,
-    scale: float,
-) -> None:
-    """Draw the legend of a scene's overlays and the labels, which keep off it.
-
-    Parameters
-    ----------
-    to_view : (4, 4) Matrix
-        See `draw_labels`.
-    size : (width, height), pixels
-    frame : (left, bottom, right, top), pixels
-        Part of the viewport that nothing covers.
-    scale : float
-        Scale of the interface.
-    """
-    blocks, taken = legend_blocks(scene), []
-    if blocks:
-        box, legend_scale = placed_legend(blocks, frame, scale)
-        draw_legend(blocks, box, legend_scale)
-        taken.append(box)
-    draw_labels(labels_of(scene), to_view, size, frame, taken, scale)
+def _draw_words() -> None:
+    """Draw the legend of the scene's overlays and the labels, which keep off it."""
+    context, scale = bpy.context, bpy.context.preferences.system.ui_scale
+    frame, blocks = free_frame(context.area, context.region), legend_blocks(context.scene)
+    taken = [draw_legend(blocks, frame, scale)] if blocks else []
+    draw_labels(labels_of(context.scene), context, frame, taken, scale)
 
 
 def forget() -> None:
