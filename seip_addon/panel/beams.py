@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from functools import lru_cache
 
 import bpy
 import numpy as np
 
-from ..core.base.arrays import Float
 from ..core.output.pictures.palette import DENSE_BEAMS, PAPER, WIDE_BEAMS, rgb
 from ..core.sensing.lidar.model import LidarModel
-from ..core.sensing.lidar.rings import BeamRings, beam_rings
+from ..core.sensing.lidar.rings import beam_rings
 from ..core.sensing.visibility.ring_resolution import unresolved_from
 from ..scene import contract
 from . import overlays
@@ -30,56 +28,16 @@ UPRIGHT = 1e-5  # radians
 LIFT = 0.05  # metres of the rings above the road
 
 
-@dataclass(frozen=True)
-class Preview:
-    """Sensor whose beams are shown.
-
-    Parameters
-    ----------
-    matrix : tuple of 16 float
-        From the sensor's axes to the scene's, row by row; the optical centre in metres.
-    height : float, metres
-        Above the road.
-    delta : float, metres
-    """
-
-    model: LidarModel
-    matrix: tuple[float, ...]
-    height: float
-    delta: float
-
-    def lines(self) -> BeamRings:
-        """Return the lines to be drawn."""
-        matrix = np.array(self.matrix).reshape(4, 4)
-        place, axes = matrix[:3, 3], self.axes
-        ground = float(place[2]) - self.height + LIFT
-        return beam_rings(self.model, place, axes, ground, 2 * self.delta, self.resolved_to())
-
-    @property
-    def axes(self) -> Float:
-        """The sensor's axes as columns, (3, 3)."""
-        rotation = np.array(self.matrix).reshape(4, 4)[:3, :3]
-        axes: Float = rotation / np.maximum(np.linalg.norm(rotation, axis=0), 1e-9)
-        return axes
-
-    def resolved_to(self) -> float:
-        """Return the radius, metres, to which all rings before the sensor are within 2δ of each other.
-
-        Of a rosette: to which all road in view has a ray of the frame within δ.
-        """
-        across = math.sqrt(max(self.model.max_range**2 - self.height**2, 0.0))
-        return unresolved_from(self.model, self.height, self.delta, across, self.tilt)
-
-    @property
-    def tilt(self) -> float:
-        """Angle by which azimuth zero points down, radians; 0 where single precision cannot tell it from 0."""
-        tilt = math.asin(max(-1.0, min(1.0, -float(self.axes[2, 0]))))
-        return tilt if abs(tilt) > UPRIGHT else 0.0
+Preview = tuple[LidarModel, tuple[float, ...], float, float]
+"""Sensor whose beams are shown: model, the 16 entries of the matrix from its axes to the scene's, height above the road
+in metres, and δ in metres."""
+Beams = tuple[tuple[Layer, ...], Block]
+"""Lines of the beams, and what their colours mean."""
 
 
-def preview_of(context: bpy.types.Context) -> Preview | None:
+def _preview() -> Preview | None:
     """Return whose beams to show: the active sensor's, else the active type's at the 3D cursor; None if unknown."""
-    scene, active = context.scene, context.object
+    scene, active = bpy.context.scene, bpy.context.object
     survey = scene.seip.survey
     height = float(survey.preview_height)
     if active is not None and active.get(contract.SENSOR) in session.sensor_types:
@@ -90,44 +48,53 @@ def preview_of(context: bpy.types.Context) -> Preview | None:
         matrix[:3, 3] = np.add(scene.cursor.location, (0.0, 0.0, height))
     else:
         return None
-    return Preview(model, tuple(matrix.ravel().tolist()), height, float(survey.delta))
-
-
-def beam_overlay() -> Overlay:
-    """Return the beams of the sensor that is active when the view is drawn."""
-    return Overlay((), _legend, moving=_layers)
-
-
-def _layers() -> tuple[Layer, ...]:
-    preview = preview_of(bpy.context)
-    return () if preview is None else _layers_of(preview)
+    return model, tuple(matrix.ravel().tolist()), height, float(survey.delta)
 
 
 @lru_cache(maxsize=1)  # until the sensor, its pose or δ changes
-def _layers_of(preview: Preview) -> tuple[Layer, ...]:
-    lines = preview.lines()
+def _beams(
+    model: LidarModel, matrix: tuple[float, ...], height: float, delta: float
+) -> tuple[tuple[Layer, ...], Block]:
+    """Return the beams of a sensor.
+
+    Up to the radius in the legend all rings before the sensor are within 2δ of each other; of a rosette, all road in
+    view has a ray of the frame within δ.
+    """
+    placed = np.array(matrix).reshape(4, 4)
+    axes = placed[:3, :3] / np.maximum(np.linalg.norm(placed[:3, :3], axis=0), 1e-9)
+    tilt = math.asin(max(-1.0, min(1.0, -float(axes[2, 0]))))
+    tilt = tilt if abs(tilt) > UPRIGHT else 0.0  # single precision cannot tell it from 0
+    across = math.sqrt(max(model.max_range**2 - height**2, 0.0))
+    resolved = unresolved_from(model, height, delta, across, tilt)
+    lines = beam_rings(model, placed[:3, 3], axes, float(placed[2, 3]) - height + LIFT, 2 * delta, resolved)
     pieces = ((lines.cone, CONE), (lines.rings[lines.wide], WIDE), (lines.rings[~lines.wide], DENSE))
+    rosette = model.rosette is not None
+    dense = f"at most {delta if rosette else 2 * delta:.3g} m to {'a ray' if rosette else 'the next ring inwards'}"
+    where = f"{'in front ' if tilt else ''}up to {resolved:.0f} m"
     return tuple(
         Layer("LINES", piece.reshape(-1, 3).astype(np.float32), colour, WIDTH) for piece, colour in pieces if len(piece)
-    )
-
-
-def _legend(_scene: bpy.types.Scene) -> Block | None:
-    """Return what the colours of the rings mean, and how far the road has no gaps."""
-    preview = preview_of(bpy.context)
-    if preview is None:
-        return None
-    rosette = preview.model.rosette is not None
-    gap = preview.delta if rosette else 2 * preview.delta
-    where = f"in front up to {preview.resolved_to():.0f} m" if preview.tilt else f"up to {preview.resolved_to():.0f} m"
-    return Block(
-        f"{preview.model.name} at {preview.height:.3g} m: no gaps on a level road {where}",
+    ), Block(
+        f"{model.name} at {height:.3g} m: no gaps on a level road {where}",
         (
-            Entry(f"at most {gap:.3g} m to {'a ray' if rosette else 'the next ring inwards'}", (DENSE,)),
+            Entry(dense, (DENSE,)),
             Entry("more: road between may go unseen", (WIDE,)),
             Entry("edge of the field of view", (CONE,)),
         ),
     )
+
+
+def beam_overlay() -> Overlay:
+    """Return the beams of the sensor that is active when the view is drawn."""
+
+    def legend(_scene: bpy.types.Scene) -> Block | None:
+        preview = _preview()
+        return None if preview is None else _beams(*preview)[1]
+
+    def layers() -> tuple[Layer, ...]:
+        preview = _preview()
+        return () if preview is None else _beams(*preview)[0]
+
+    return Overlay((), legend, moving=layers)
 
 
 class SEIP_OT_preview_beams(ShortWork, bpy.types.Operator):

@@ -9,11 +9,10 @@ from tempfile import TemporaryDirectory
 
 import bpy
 
-from ..core.base.errors import SeipError
 from ..core.base.progress import Progress
 from ..core.output.pictures.colours import unpacked_counts
 from ..core.output.report.sections import write_report
-from ..core.output.results.placement_record import load_placement, parsed_record
+from ..core.output.results.placement_record import parsed_record
 from ..core.storage.files import check_folder
 from ..scene.blend_file import save_blend
 from ..scene.coverage_colours import show_seen_by
@@ -30,8 +29,6 @@ from .scene_status import no_folder, not_evaluated
 from .session import SceneState, session
 from .survey import with_placement
 from .work import ForPlacement, Job, LongWork, started
-
-_RECORD = "placement.json"
 
 
 class _Writes(ForPlacement, LongWork):
@@ -89,37 +86,21 @@ def _exported(folder: Path, scene: bpy.types.Scene) -> Generator[Progress, None,
 
 
 class SEIP_OT_write_report(_Writes, bpy.types.Operator):
-    """Write a report on the placement to the folder, as HTML and PDF; export the placement first if needed"""
+    """Write the files of the placement to the folder, and a report on them as HTML and PDF"""
 
     stopped_message = "stopped; no report was written"
 
     def job(self, scene: bpy.types.Scene) -> Job:
-        """Export unless the folder holds this result, write the report, and say where the files are."""
+        """Export the placement, write the report, and say where the files are."""
         folder = _checked_folder(scene)
-        is_exported = _holds(folder, scene.seip.result.record)
-        exporting = with_placement(scene) if is_exported else started(_exported(folder, scene))
-        scene, (state, written) = yield _reported(folder, exporting)
+        scene, (state, written) = yield started(_reported(folder, scene))
         session.of(scene).state = state
-        self.report({"INFO"}, f"written: {' and '.join(path.name for path in written)} in {written[0].parent}")
+        self.report({"INFO"}, f"written: {' and '.join(path.name for path in written)} in {folder}")
 
 
-def _reported(
-    folder: Path, exporting: Generator[Progress, None, SceneState]
-) -> Generator[Progress, None, tuple[SceneState, tuple[Path, ...]]]:
-    state = yield from exporting
+def _reported(folder: Path, scene: bpy.types.Scene) -> Generator[Progress, None, tuple[SceneState, tuple[Path, ...]]]:
+    state = yield from _exported(folder, scene)
     return state, (yield from write_report(folder))
-
-
-def _holds(folder: Path, record: str) -> bool:
-    """Return whether a folder holds the export of a placement."""
-    try:
-        written = load_placement(folder / _RECORD)
-    except SeipError:
-        return False
-    present = parsed_record(record)
-    # The goal is compared too: with other shares of the road users, the same sensors have another value in the files.
-    one, other = ((of.sensors, of.inputs, of.notes, of.request.goal) for of in (written, present))
-    return one == other
 
 
 def draw(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:

@@ -10,15 +10,13 @@ from collections.abc import Generator
 
 import bpy
 import numpy as np
-from numpy.typing import NDArray
 
-from ..core.base.arrays import Boolean, Integer
+from ..core.base.arrays import Integer
 from ..core.base.errors import SeipError
 from ..core.base.progress import Progress
-from ..core.choosing.placement.deployment import Deployment
 from ..core.choosing.placement.returns_summary import returns_text
 from ..core.sensing.scans.sensor import MountedSensor
-from ..core.sensing.visibility.visibility_model import VisibilityModel, visibility_model
+from ..core.sensing.visibility.visibility_model import visibility_model
 from ..core.workflows.returns import SensorReturns
 from ..scene import contract
 from ..scene.coverage_colours import show_seen_by
@@ -26,22 +24,11 @@ from ..scene.sensors import read_sensors
 from . import preferences
 from .layout import draw_sentence
 from .scene_status import same_pose, sensor_edits
-from .session import FollowedSensors, SceneState, scene_of, session
+from .session import Followed, FollowedSensors, SceneState, scene_of, session
 from .survey import with_placement
 from .work import ForPlacement, Job, LongWork, Outcome
 
 DELAY = 0.02  # seconds from a movement to the look at it: a drag reports many
-
-
-def start(
-    scene: bpy.types.Scene, state: SceneState, visibility: VisibilityModel, returns: SensorReturns | None
-) -> None:
-    """Follow the sensors of a scene, starting with the visibility of the placement."""
-    stop()
-    _, solution = state.placed()
-    known = _as_placed(solution.deployment, returns)
-    session.following = FollowedSensors(scene.session_uid, state, visibility, returns, known)
-    update()
 
 
 def stop() -> None:
@@ -87,27 +74,13 @@ def _update(followed: FollowedSensors, scene: bpy.types.Scene) -> None:
     show_seen_by(scene, seen_by, pedestrians)
 
 
-def _as_placed(
-    deployment: Deployment, returns: SensorReturns | None
-) -> dict[str, tuple[MountedSensor, Boolean, NDArray[np.float32] | None]]:
-    """Return visibility and returns of sensors at candidate poses; those of the others are computed again."""
-    seen = zip(deployment.sensors, deployment.rows, strict=True)
-    return {
-        one.label: (one, row, None if returns is None else returns.of(one)) for one, row in seen if one.pose is not None
-    }
-
-
 def _same(one: MountedSensor, other: MountedSensor) -> bool:
     return same_pose((one.xyz, one.orientation), (other.xyz, other.orientation)) and one.model.key == other.model.key
 
 
 def _on_update(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     """Have a look soon where a sensor moved, came or went; never at once, as looking changes the scene."""
-    if (
-        session.following is None
-        or scene.session_uid != session.following.scene
-        or bpy.app.timers.is_registered(update)
-    ):
+    if session.following is None or scene.session_uid != session.following.scene:
         return
     objects = [update for update in depsgraph.updates if isinstance(update.id, bpy.types.Object)]
     moved = any(update.is_updated_transform and contract.SENSOR in update.id for update in objects)
@@ -116,19 +89,13 @@ def _on_update(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
         _update_soon()
 
 
-def _on_undo(*_: object) -> None:
-    """Have a look at what an undo or redo brought back: Blender names no object."""
+def _update_soon(*_: object) -> None:
+    """Have a look soon; undo and redo name no object that they bring back."""
     if session.following is not None and not bpy.app.timers.is_registered(update):
-        _update_soon()
+        bpy.app.timers.register(update, first_interval=DELAY)
 
 
-def _update_soon() -> None:
-    bpy.app.timers.register(update, first_interval=DELAY)
-
-
-HANDLERS = (("depsgraph_update_post", _on_update), ("undo_post", _on_undo), ("redo_post", _on_undo))
-
-
+HANDLERS = (("depsgraph_update_post", _on_update), ("undo_post", _update_soon), ("redo_post", _update_soon))
 forget = stop  # another file is opened, or the add-on is disabled
 
 
@@ -151,22 +118,24 @@ class SEIP_OT_follow_sensors(ForPlacement, LongWork, bpy.types.Operator):
 
     def job(self, scene: bpy.types.Scene) -> Job:
         """Restore the placement, and begin to follow."""
-        scene, (state, model, returns) = yield _set_up(with_placement(scene))
-        session.of(scene).state = state
-        start(scene, state, model, returns)
+        scene, followed = yield _set_up(scene.session_uid, with_placement(scene))
+        session.of(scene).state, session.following = followed.state, followed
+        update()
 
 
-def _set_up(
-    finding: Generator[Progress, None, SceneState],
-) -> Generator[Progress, None, tuple[SceneState, VisibilityModel, SensorReturns | None]]:
-    """Return what following sensors needs."""
+def _set_up(scene: int, finding: Generator[Progress, None, SceneState]) -> Generator[Progress, None, FollowedSensors]:
+    """Return the sensors of a placement with their visibility; those that are at no candidate pose are cast later."""
     state = yield from finding
-    settings = state.layout.settings
     yield Progress(0, 0, "getting ready to cast")
+    settings, (_, solution) = state.layout.settings, state.placed()
+    deployment = solution.deployment
     visibility = visibility_model(state.layout.site, settings.visibility, settings.engine)
-    _, solution = state.placed()
-    of_returns = solution.deployment.returns is not None
-    return state, visibility, SensorReturns(state.layout, solution.objective) if of_returns else None
+    returns = None if deployment.returns is None else SensorReturns(state.layout, solution.objective)
+    seen = zip(deployment.sensors, deployment.rows, strict=True)
+    known: dict[str, Followed] = {
+        one.label: (one, row, None if returns is None else returns.of(one)) for one, row in seen if one.pose is not None
+    }
+    return FollowedSensors(scene, state, visibility, returns, known)
 
 
 def draw_followed(layout: bpy.types.UILayout, following: FollowedSensors) -> None:
@@ -175,7 +144,7 @@ def draw_followed(layout: bpy.types.UILayout, following: FollowedSensors) -> Non
         draw_sentence(layout, following.problem, icon="ERROR", alert=True)
         return
     layout.label(text=_followed_text(following), icon="HIDE_OFF")
-    if edits := sensor_edits(bpy.context.scene).describe():
+    if edits := sensor_edits(bpy.context.scene):
         draw_sentence(layout, edits)
 
 

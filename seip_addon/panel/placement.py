@@ -286,7 +286,7 @@ def _draw_answer(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
     stale = scene_status.stale_placement(scene)
     if stale and stale != scene_status.ANOTHER_SITE:
         draw_run(box, "seip.compare_scene")
-    if sensor_edits(scene).describe():
+    if sensor_edits(scene):
         draw_run(box, "seip.evaluate_sensors")
     other_goal = "" if doubts else scene_status.other_goal(scene)
     if other_goal:

@@ -20,8 +20,9 @@ from ..core.output.results.versions import versions
 from ..core.sensing.lidar.model import short_name
 from ..core.sensing.scans.sensor import MountedSensor
 from ..core.storage.files import digest
-from ..core.workflows.moved_sensors import evaluate_moved_sensors
+from ..core.workflows.moved_sensors import BY_HAND, evaluate_moved_sensors
 from ..core.workflows.records import record_of
+from ..scene import contract
 from ..scene.sensors import labelled_sensors, placed_sensors, read_sensors
 from ..scene.write import coverage_of, take_over
 from . import following, preferences, scene_status
@@ -30,7 +31,7 @@ from .coverage import draw_view
 from .following import draw_followed
 from .layout import RowList, draw_list, draw_reason, draw_run, draw_sections
 from .properties import path_property
-from .scene_status import active_sensor, no_placement, position_names
+from .scene_status import active_sensor, no_placement
 from .session import SceneState, session
 from .survey import read_layout, with_grid_of, with_visibility
 from .work import ForPlacement, ForReadyScene, Job, LongWork, ShortWork, select_alone
@@ -130,13 +131,23 @@ class SEIP_OT_evaluate_sensors(ForReadyScene, LongWork, bpy.types.Operator):
     def job(self, scene: bpy.types.Scene) -> Job:
         """Evaluate the sensors; those without a placement are evaluated under the goal of the panel."""
         mounted = read_sensors(scene, preferences.catalogue(), hidden=True)
-        text, names = scene.seip.result.record, position_names(scene)
+        text, names = scene.seip.result.record, _position_names(scene)
         record = parsed_record(text) if text else None
         objective = scene.seip.goal.objective() if record is None else record.request.goal
         scene, state = yield _evaluated(read_layout(scene), record, objective, mounted, names)
         survey, solution = state.placed()
         take_over(scene, survey.site, solution.deployment, labelled_sensors(scene, hidden=True))
         self.report({"INFO"}, answer(keep_result(scene, state))[0])
+
+
+def _position_names(scene: bpy.types.Scene) -> dict[str, str]:
+    """Return position names by sensor label, for sensors that are not at a candidate pose."""
+    sensors = labelled_sensors(scene, hidden=True)
+    names = {label: str(sensor.get(contract.POSITION, "")) for label, sensor in sensors.items()}
+    return {
+        label: name if not name or name.startswith(BY_HAND) else f"{BY_HAND}, from {name}"
+        for label, name in names.items()
+    }
 
 
 def _evaluated(

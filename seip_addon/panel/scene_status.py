@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import bpy
 import numpy as np
@@ -14,7 +14,6 @@ from ..core.base.arrays import Float
 from ..core.base.errors import SeipError
 from ..core.output.results.answer import sentence
 from ..core.output.results.placement_record import RecordedSensor, parsed_record
-from ..core.workflows.moved_sensors import BY_HAND
 from ..core.workflows.survey_settings import SurveySettings
 from ..scene import contract
 from ..scene.sensors import labelled_sensors, placed_sensors, pose_of
@@ -170,11 +169,6 @@ def same_grid(one: SurveySettings | str, other: SurveySettings | str, *, sensors
     return as_other == other
 
 
-def has_placement(scene: bpy.types.Scene) -> bool:
-    """Return whether a scene has a placement that can be shown."""
-    return not no_placement(scene)
-
-
 def no_placement(scene: bpy.types.Scene) -> str:
     """Say that there is no placement that can be shown; empty if there is one."""
     if is_newer(scene):
@@ -193,7 +187,7 @@ def no_folder(scene: bpy.types.Scene) -> str:
 
 def not_evaluated(scene: bpy.types.Scene) -> str:
     """Say what was done by hand to the sensors since they were placed or evaluated; empty if nothing was."""
-    edits = sensor_edits(scene).describe()
+    edits = sensor_edits(scene)
     return f"{edits} Press Evaluate Sensors, or undo." if edits else ""
 
 
@@ -203,56 +197,27 @@ def no_sensors(scene: bpy.types.Scene) -> str:
 
 
 def is_changed(scene: bpy.types.Scene) -> bool:
-    """Return whether the placement is known not to be of the scene as it is now."""
-    return any(text != NOT_COMPARED for text in doubts(scene))
+    """Return whether there is a placement that is known not to be of the scene as it is now."""
+    return not no_placement(scene) and any(text != NOT_COMPARED for text in doubts(scene))
 
 
 def doubts(scene: bpy.types.Scene) -> list[str]:
     """Return why the placement is not, or may not be, of the scene as it is now."""
-    return [text for text in (stale_placement(scene), sensor_edits(scene).describe()) if text]
+    return [text for text in (stale_placement(scene), sensor_edits(scene)) if text]
 
 
-@dataclass(frozen=True)
-class SensorEdits:
-    """Differences between the sensors in a scene and those of its placement, as labels.
-
-    Parameters
-    ----------
-    moved : tuple of str
-        Moved, rotated or of another type.
-    deleted, added : tuple of str
-    """
-
-    moved: tuple[str, ...] = ()
-    deleted: tuple[str, ...] = ()
-    added: tuple[str, ...] = ()
-
-    def __bool__(self) -> bool:
-        return bool(self.moved or self.deleted or self.added)
-
-    def describe(self) -> str:
-        """Return the edits as a sentence, empty without any."""
-        edits = (("moved", self.moved), ("deleted", self.deleted), ("added", self.added))
-        parts = [f"{', '.join(labels)} {edit}" for edit, labels in edits if labels]
-        return f"By hand: {'; '.join(parts)}." if parts else ""
-
-
-def sensor_edits(scene: bpy.types.Scene) -> SensorEdits:
-    """Compare the sensors in a scene, hidden or not, with its placement."""
+def sensor_edits(scene: bpy.types.Scene) -> str:
+    """Return in a sentence what was done by hand to the sensors, hidden or not, since the placement, or ""."""
     text = scene.seip.result.record
     placed = {sensor.id: sensor for sensor in parsed_record(text).sensors} if text else {}
     present = labelled_sensors(scene, hidden=True)
-    return SensorEdits(
-        moved=tuple(label for label in present if label in placed and not _is_same(present[label], placed[label])),
-        deleted=tuple(label for label in placed if label not in present),
-        added=tuple(label for label in present if label not in placed),
-    )
-
-
-def position_names(scene: bpy.types.Scene) -> dict[str, str]:
-    """Return position names by sensor label, for sensors that are not at a candidate pose."""
-    sensors = labelled_sensors(scene, hidden=True)
-    return {label: _moved_from(str(sensor.get(contract.POSITION, ""))) for label, sensor in sensors.items()}
+    edits = {
+        "moved": [label for label in present if label in placed and not _is_same(present[label], placed[label])],
+        "deleted": [label for label in placed if label not in present],
+        "added": [label for label in present if label not in placed],
+    }
+    parts = [f"{', '.join(labels)} {edit}" for edit, labels in edits.items() if labels]
+    return f"By hand: {'; '.join(parts)}." if parts else ""
 
 
 def same_pose(one: tuple[Float, Float], other: tuple[Float, Float]) -> bool:
@@ -260,10 +225,6 @@ def same_pose(one: tuple[Float, Float], other: tuple[Float, Float]) -> bool:
     tolerance = POSE_TOLERANCE * max(1.0, float(np.abs(other[0]).max()))
     same_position = np.allclose(one[0], other[0], rtol=0, atol=tolerance)
     return same_position and np.allclose(one[1], other[1], rtol=0, atol=POSE_TOLERANCE)
-
-
-def _moved_from(name: str) -> str:
-    return name if not name or name.startswith(BY_HAND) else f"{BY_HAND}, from {name}"
 
 
 def _is_same(sensor: bpy.types.Object, recorded: RecordedSensor) -> bool:

@@ -279,7 +279,7 @@ def _draw_mounting(layout: bpy.types.UILayout, context: bpy.types.Context) -> No
 
 
 def _draw_about(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
-    """Draw the figures of a chosen product, and what they rest on."""
+    """Draw how far a chosen product measures the road, and what its figures rest on."""
     survey = context.scene.seip.survey
     layout.prop_search(survey, "about", survey, "types", text="", icon="VIEWZOOM")
     model = session.sensor_types.get(survey.shown_type())
@@ -287,7 +287,7 @@ def _draw_about(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
         draw_sentence(layout, "Choose a sensor that is in the catalogue.", icon="INFO")
         return
     layout.label(text=title(model), translate=False)
-    for what, value in (*_figures(model), *_on_road(model, survey.parsed_heights(), survey.delta)):
+    for what, value in _on_road(model, survey.parsed_heights(), survey.delta):
         split = layout.split(factor=0.42)
         split.scale_y = 0.8
         split.label(text=what)
@@ -311,28 +311,3 @@ def _on_road(model: LidarModel, heights: list[float], delta: float) -> list[tupl
     if dense < across:
         lines.append(("Rings close", f"up to {dense:.0f} m, then gaps"))
     return lines
-
-
-def _figures(model: LidarModel) -> list[tuple[str, str]]:
-    low, high = math.degrees(model.elevations.min()), math.degrees(model.elevations.max())
-    cheap, dear = model.price_range
-    reach = [
-        ("Range", f"{model.min_range:g}…{model.max_range:g} m"),
-        ("On a pedestrian", f"up to {pedestrian_range(model):.0f} m"),
-        ("Points", f"{model.points_per_second:,.0f} /s"),
-    ]
-    if model.rosette is None:
-        beams = [
-            ("Channels", f"{model.channels}"),
-            ("Elevations", f"{low:.4g}…{high:.4g}°"),
-            *reach,
-            ("Rotation", f"{model.rotation_rate:g} Hz"),
-            ("Azimuth", f"{math.degrees(model.azimuth_step):.2g}°"),
-        ]
-    else:
-        beams = [("Pattern", "rosette"), *reach, ("Accumulated", f"{1 / model.rotation_rate:g} s")]
-    return [
-        *beams,
-        ("Field of view", f"{math.degrees(model.field_of_view):.4g}°"),
-        ("Price", f"${cheap:,.0f}" if cheap == dear else f"${cheap:,.0f}…{dear:,.0f}"),
-    ]

@@ -189,6 +189,10 @@ class RunningWork:
     acceptance: Acceptance | None = None
 
 
+Followed = tuple[MountedSensor, Boolean, NDArray[np.float32] | None]
+"""Last pose of a sensor, the targets seen (t,), and the returns from road users (m,) if these are wanted."""
+
+
 @dataclass
 class FollowedSensors:
     """Sensors whose coverage is computed again whenever they are moved.
@@ -201,8 +205,7 @@ class FollowedSensors:
         Visibility of the site.
     returns : SensorReturns or None
         Returns from road users, for a placement that was chosen for them.
-    sensors : dict of str to (MountedSensor, (t,) bool, (m,) float32 or None)
-        Last pose of each sensor, the targets seen, and the returns from road users.
+    sensors : dict of str to Followed
     coverage : float
         Share of the targets that some sensor sees.
     summary : ReturnsSummary or None
@@ -215,7 +218,7 @@ class FollowedSensors:
     state: SceneState
     visibility: VisibilityModel
     returns: SensorReturns | None
-    sensors: dict[str, tuple[MountedSensor, Boolean, NDArray[np.float32] | None]] = field(default_factory=dict)
+    sensors: dict[str, Followed] = field(default_factory=dict)
     coverage: float = 0.0
     summary: ReturnsSummary | None = None
     problem: str = ""

@@ -140,8 +140,8 @@ class SEIP_PT_steps(Sidebar, bpy.types.Panel):
         parts = {"site": site_check, "sensors": sensors, "placement": placement}
         draw_sections(layout, steps, context, {name: part.status(scene) for name, part in parts.items()})
         layout.separator(type="LINE")
-        changed = scene_status.has_placement(scene) and scene_status.is_changed(scene)
-        states = {"results": Status(changed), "traffic": Status(any(one.changed for one in _traffic(scene).values()))}
+        traffic_changed = any(one.changed for one in _traffic(scene).values())
+        states = {"results": Status(scene_status.is_changed(scene)), "traffic": Status(traffic_changed)}
         after = {"results": results.draw, "traffic": draw_traffic, "export": export.draw}
         draw_sections(layout, after, context, states)
 
