@@ -9,7 +9,7 @@ import bpy
 
 PARTS = (
     "session", "overlays", "work", "layout", "preferences", "survey", "sensors", "beams", "object_roles", "site_check",
-    "junction_map", "site", "objective", "sight_lines", "traffic", "scans", "coverage", "following", "comparison",
+    "site", "objective", "sight_lines", "traffic", "scans", "coverage", "following", "comparison",
     "results", "export", "simulation", "detection", "verification", "placement", "sidebar", "events",
 )  # fmt: skip
 """Modules of the panel, whose classes are registered in the order of their definition.

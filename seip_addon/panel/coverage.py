@@ -17,7 +17,6 @@ from . import overlays, scans, sight_lines
 from .layout import draw_reason, draw_sentence
 from .legend import Block, Entry, Label
 from .overlays import Overlay
-from .properties import path_property
 from .scene_status import no_placement
 from .session import session
 from .work import ShortWork
@@ -130,11 +129,6 @@ class SEIP_PG_view(bpy.types.PropertyGroup):
             ("instance", "Road User", "Road user that the point is on"),
         ),
         update=_recolour,
-    )
-    picture: path_property(
-        "Picture",
-        "PNG to write; where one of that name is there already, the next gets a number",
-        default="//placement.png",
     )
 
 
