@@ -104,7 +104,7 @@ def _product(obj: bpy.types.Object) -> str:
 
 
 def _recolour(own: bpy.types.PropertyGroup, _context: object) -> None:
-    scans.show_cloud(own.id_data)
+    scans.recolour_cloud(own.id_data)
 
 
 def _show_legend(own: bpy.types.PropertyGroup, _context: object) -> None:
@@ -168,22 +168,16 @@ class SEIP_OT_hide_overlay(ShortWork, bpy.types.Operator):
     name: bpy.props.StringProperty(name="Name", description="Name of the overlay")
 
     def act(self, context: bpy.types.Context) -> None:
-        """Hide it; a point cloud is forgotten, as it would be shown again in other colours."""
-        if self.name == scans.NAME:
-            scans.hide_cloud(context.scene)
+        """Hide it."""
         overlays.hide(context.scene, self.name)
 
 
 def draw_view(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     """Draw what can be shown."""
-    scene = context.scene
-    nothing = why_no_coverage(scene) and no_placement(scene) and session.of(scene).scan is None
-    if draw_reason(layout, "There is nothing to show yet." if nothing else ""):
-        return
-    _draw_coverage(layout, context)
-    sight_lines.draw(layout, context)
-    if session.of(scene).scan is not None:
-        _draw_cloud(layout, context)
+    nothing = why_no_coverage(context.scene) and no_placement(context.scene)
+    if not draw_reason(layout, "There is nothing to show yet." if nothing else ""):
+        _draw_coverage(layout, context)
+        sight_lines.draw(layout, context)
 
 
 def _draw_coverage(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
@@ -203,10 +197,3 @@ def _draw_coverage(layout: bpy.types.UILayout, context: bpy.types.Context) -> No
     if not draw_reason(column, why_no_coverage(context.scene)) and not shows_coverage(context.space_data):
         text = "This view's shading does not show the colours: press one of them."
         draw_sentence(column, text, icon="ERROR")
-
-
-def _draw_cloud(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
-    column = layout.column(align=True)
-    column.label(text="Point Cloud")
-    column.row(align=True).prop(context.scene.seip.view, "cloud_colour", expand=True)
-    column.operator("seip.hide_overlay", icon="X").name = scans.NAME

@@ -19,13 +19,15 @@ LOAD_DELAY = 0.2
 
 
 def _after_load(*_: object) -> None:
-    """List sensor types, take over placements of commands, show coverage as saved, and soon compare placements."""
+    """List sensor types, take over placements of commands, show what was shown, and soon compare placements."""
     sensors.refresh()
     for scene in bpy.data.scenes:
         if scene.library is None:
             _take_over_placement(scene)
             _use_types_of_sensors(scene)
         coverage.update(scene)
+    for window in bpy.context.window_manager.windows[:1]:
+        bpy.context.window_manager.seip_sections.follow_steps(window.scene)
     if not bpy.app.background and not bpy.app.timers.is_registered(_compare):  # Blender is not ready for work yet
         bpy.app.timers.register(_compare, first_interval=LOAD_DELAY)
 

@@ -58,6 +58,7 @@ from .work import ForReadyScene, Job, LongWork, started
 SEARCH = "search"
 COLOUR: Colour = (*rgb(SENSOR_BODY), 1.0)
 DOT, POST = 12.0, 3.0  # pixels at the interface's usual scale
+FRONT = "The best placement found for each number; the report says how much better others could be."
 NAME_SHARE = 0.68
 """Share of a row that the name of a figure takes."""
 NUMBER_SHARE = 0.3
@@ -315,7 +316,7 @@ def _draw_numbers(layout: bpy.types.UILayout, record: PlacementRecord, *, goal: 
         )
         button.count = count
         row.progress(factor=share, text=text)
-    draw_sentence(layout, front_text(record), icon="INFO", reserved=BOX)
+    draw_sentence(layout, FRONT, icon="INFO", reserved=BOX)
 
 
 def numbers(record: PlacementRecord) -> list[tuple[int, float, str]]:
@@ -327,22 +328,6 @@ def numbers(record: PlacementRecord) -> list[tuple[int, float, str]]:
     return [
         (point.count, point.returns / most, f"{returns_text(point.returns)} · ${point.price:,.0f}") for point in front
     ]
-
-
-def front_text(record: PlacementRecord) -> str:
-    """Return what the placements of other numbers of sensors are, and how much better they could be."""
-    if record.returns is not None:
-        gaps = [point.gap for point in record.returns.front]
-        if None in gaps:
-            limit = "Not every number is proven."
-        else:
-            most = max(gap for gap in gaps if gap is not None)
-            limit = f"Others have at most {most:.1%} more." if most else "No other has more."
-        return f"Returns per revolution and price of the best placement found for each number. {limit}"
-    what = "Coverage by weight" if record.objective.kind == "weighted" else "Coverage"
-    missed = max(point.missed for point in record.front)
-    limit = f"Others see at most {missed:.1%} of the road more." if missed else "No other sees more."
-    return f"{what} and price of the best placement found for each number. {limit}"
 
 
 def _draw_details(layout: bpy.types.UILayout, record: PlacementRecord, *, certain: bool) -> None:
@@ -361,7 +346,8 @@ def _draw_details(layout: bpy.types.UILayout, record: PlacementRecord, *, certai
         proven = objective.status == "optimal" and not purpose(notes)  # of the coverage that is shown above
         proof = certificate(objective.status, objective.gap, cheapest=objective.cheapest, notes=notes)
         draw_sentence(layout, proof, icon="CHECKMARK" if proven else "INFO", reserved=BOX)
-    for note in (*record.notes, *_warnings(record)):
+    # warnings about a sensor type are shown with the type
+    for note in (*record.notes, *relevant_warnings(record.warnings, record.request.candidates.sensors, ())):
         draw_sentence(layout, sentence(note), icon="INFO", reserved=BOX)
 
 
@@ -387,8 +373,3 @@ def figures(record: PlacementRecord) -> dict[str, list[tuple[str, str]]]:
         "Pedestrian's Returns at Worst Point": crossings,
         "Price": [*price, ("Total", record.price_text)],
     }
-
-
-def _warnings(record: PlacementRecord) -> list[str]:
-    """Return the warnings about the site; those about a sensor type are shown with the type."""
-    return relevant_warnings(record.warnings, record.request.candidates.sensors, ())

@@ -174,8 +174,8 @@ def keep_result(scene: bpy.types.Scene, state: SceneState) -> PlacementRecord:
     kept = scene.seip.result
     kept.change = "" if no_placement(scene) else change_text(record, parsed_record(kept.record))
     kept.keep(record.text(), digest(survey.site.targets.xyz), packed_counts(solution.deployment.seen_by))
-    bpy.context.window_manager.seip_sections.follow_steps()
     session.of(scene).state = replace(state, record=kept.record)
+    bpy.context.window_manager.seip_sections.follow_steps(scene)
     return record
 
 

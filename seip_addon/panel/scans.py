@@ -17,7 +17,6 @@ from ..core.output.results.versions import versions
 from ..core.sensing.scans.frame import Frame
 from ..core.sensing.scans.run_folder import Record, Run, check_run_folder
 from ..core.sensing.scans.sensor import MountedSensor
-from ..core.sensing.scans.simulation import Simulation
 from ..core.sensing.traffic.source import load_traffic
 from ..core.workflows.recording import RecordingSettings, frame_number, make_run, record, simulation_of
 from ..scene import contract
@@ -39,35 +38,22 @@ POINT_SIZE = 2.0  # pixels, at the interface's usual scale
 NO_TRAFFIC = "There is nothing to scan: name a traffic file, or animate objects in SEIP Traffic."
 
 
-def now(scene: bpy.types.Scene) -> float:
-    """Return the time of a scene's current frame in seconds: 0 at frame 0."""
-    return float(scene.frame_current_final * scene.render.fps_base / scene.render.fps)
-
-
-def measure(run: Run, simulation: Simulation, at: float) -> LastScan:
-    """Scan at a time in seconds."""
-    began = time.perf_counter()
-    frame = simulation.frame(*frame_number(run, at))
-    return LastScan(run, simulation, frame, time.perf_counter() - began)
-
-
-def keep(scene: bpy.types.Scene, scan: LastScan) -> None:
-    """Keep a scan and show its points."""
-    session.of(scene).scan = scan
-    show_cloud(scene)
-
-
-def show_cloud(scene: bpy.types.Scene) -> None:
-    """Show the points of a scene's last scan, in the colours that its panel asks for."""
-    scan = session.of(scene).scan
-    if scan is not None:
-        overlays.show(scene, NAME, cloud_overlay(scan.frame, scan.run.sensors, scene.seip.view.cloud_colour))
-
-
-def hide_cloud(scene: bpy.types.Scene) -> None:
+def forget_scan(scene: bpy.types.Scene) -> None:
     """Let go of a scene's scan."""
     session.of(scene).scan = None
     overlays.hide(scene, NAME)
+
+
+def recolour_cloud(scene: bpy.types.Scene) -> None:
+    """Show the point cloud of a scene, if it is shown, in the colours that its panel asks for."""
+    if overlays.find(scene, NAME) is not None:
+        _show_cloud(scene)
+
+
+def _show_cloud(scene: bpy.types.Scene) -> None:
+    scan = session.of(scene).scan
+    if scan is not None:
+        overlays.show(scene, NAME, cloud_overlay(scan.frame, scan.run.sensors, scene.seip.view.cloud_colour))
 
 
 def cloud_overlay(frame: Frame, sensors: Sequence[MountedSensor], by: By) -> Overlay:
@@ -113,8 +99,10 @@ class SEIP_OT_scan_frame(LongWork, bpy.types.Operator):
 
     def job(self, scene: bpy.types.Scene) -> Job:
         """Scan the scene as it is, and show the points."""
-        scene, result = yield _scanned(_run_of(scene), now(scene), session.of(scene).scan)
-        keep(scene, result)
+        now = scene.frame_current_final * scene.render.fps_base / scene.render.fps  # seconds, 0 at frame 0
+        scene, result = yield _scanned(_run_of(scene), now, session.of(scene).scan)
+        session.of(scene).scan = result
+        _show_cloud(scene)
         for sentence in result.simulation.warnings:
             self.report({"WARNING"}, sentence)
         self.report({"INFO"}, f"{counted(len(result.frame), 'point')} in {1e3 * result.seconds:.0f} ms")
@@ -129,7 +117,9 @@ def _scanned(
     else:
         simulation = yield from simulation_of(run)
     yield Progress(0, 0, "scan")
-    return measure(run, simulation, at)
+    began = time.perf_counter()
+    frame = simulation.frame(*frame_number(run, at))
+    return LastScan(run, simulation, frame, time.perf_counter() - began)
 
 
 class SEIP_OT_write_dataset(LongWork, bpy.types.Operator):
@@ -181,6 +171,9 @@ def draw_scan(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     scan = session.of(context.scene).scan
     for line in scan.facts if scan is not None else ():
         draw_sentence(layout, line)
+    if overlays.find(context.scene, NAME) is not None:
+        layout.row(align=True).prop(context.scene.seip.view, "cloud_colour", expand=True)
+        layout.operator("seip.hide_overlay", icon="X").name = NAME
 
 
 def draw_dataset(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import bpy
@@ -34,8 +33,6 @@ from .survey import SEIP_PG_survey
 from .traffic import SEIP_PG_traffic
 from .verification import SEIP_PG_verification
 
-AUTOMATIC, CLOSED, OPEN = -1, 0, 1
-"""States of a step: open while it is the current one, or as the user left it."""
 STEPS: tuple[tuple[str, ...], ...] = (
     ("load_example", "download_map", "choose_map", "build_site", "check_site"),
     ("add_catalogue", "preview_beams", "solve_placement"),
@@ -47,36 +44,16 @@ STEPS: tuple[tuple[str, ...], ...] = (
 """Operators of the menu, by step of the work."""
 
 
-def _step(name: str, title: str) -> Any:  # noqa: ANN401 -- what Blender makes of a property
-    """Return the property of a step that is open while it is the current one, until a user opens or closes it."""
-    stored = f"{name}_state"
-
-    def is_open(own: SEIP_PG_sections) -> bool:
-        state = getattr(own, stored)
-        return bool(state == OPEN or (state == AUTOMATIC and scene_status.current_step(bpy.context.scene) == name))
-
-    def set_open(own: SEIP_PG_sections, value: bool) -> None:  # noqa: FBT001 -- Blender's signature
-        setattr(own, stored, OPEN if value else CLOSED)
-
-    getter: Callable[[SEIP_PG_sections], bool] = is_open
-    return BoolProperty(
-        name=title, description="Show or hide this step", get=getter, set=set_open, options={"SKIP_SAVE"}
-    )
-
-
-def _section(title: str) -> Any:  # noqa: ANN401 -- as above
+def _section(title: str) -> Any:  # noqa: ANN401 -- what Blender makes of a property
     return BoolProperty(name=title, description="Show or hide this section", default=False)
 
 
 class SEIP_PG_sections(bpy.types.PropertyGroup):
     """Open and closed sections of the sidebar."""
 
-    site_state: IntProperty(default=AUTOMATIC, options={"HIDDEN", "SKIP_SAVE"})
-    sensors_state: IntProperty(default=AUTOMATIC, options={"HIDDEN", "SKIP_SAVE"})
-    placement_state: IntProperty(default=AUTOMATIC, options={"HIDDEN", "SKIP_SAVE"})
-    site: _step("site", "Site")
-    sensors: _step("sensors", "Sensors")
-    placement: _step("placement", "Placement")
+    site: _section("Site")
+    sensors: _section("Sensors")
+    placement: _section("Placement")
     change_site: _section("Change Site")
     sources: _section("Surroundings and Terrain")
     roles: _section("Roles of Objects")
@@ -100,13 +77,14 @@ class SEIP_PG_sections(bpy.types.PropertyGroup):
     verification: _section("Verification")
     export: _section("Export")
 
-    def follow_steps(self) -> None:
-        """Open the current step and close the others, now and from now on."""
-        self.site_state = self.sensors_state = self.placement_state = AUTOMATIC
+    def follow_steps(self, scene: bpy.types.Scene) -> None:
+        """Open the current step of a scene and close the others."""
+        current = scene_status.current_step(scene)
+        self.site, self.sensors, self.placement = (step == current for step in ("site", "sensors", "placement"))
 
 
 def forget() -> None:
-    """Close all sections but the current step: another file is opened, which may bring its own state."""
+    """Close all sections: another file is opened, whose current step is opened then."""
     if isinstance(bpy.data, bpy.types.BlendData):  # Blender shows nobody the open file while it registers an add-on
         bpy.context.window_manager.property_unset("seip_sections")
 
@@ -129,7 +107,7 @@ class SEIP_PG_scene(bpy.types.PropertyGroup):
 
 
 class SEIP_PT_steps(Sidebar, bpy.types.Panel):
-    """Panel: the three steps to a placement, each with its status, and what follows; the current step is open."""
+    """Panel: the three steps to a placement, each with its status, and what follows."""
 
     bl_label = "Sensor Placement"
 

@@ -38,7 +38,7 @@ class SEIP_OT_check_site(LongWork, bpy.types.Operator):
         watching, settings = watch(scene), scene_status.survey_settings(scene)
         scene, found = yield _checked(contents_of(scene), settings)
         session.of(scene).check = CheckedScene(found, watching, settings)
-        bpy.context.window_manager.seip_sections.follow_steps()
+        bpy.context.window_manager.seip_sections.follow_steps(scene)
         self.report({"INFO"}, in_short(found.problems))
 
 

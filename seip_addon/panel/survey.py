@@ -215,17 +215,19 @@ def read_layout(scene: bpy.types.Scene) -> Generator[Progress, None, SceneState]
     settings.models()  # refuses before the scene is read
     catalogues = tuple((path, path.stat().st_mtime_ns) for path in settings.catalogue)
     cache, cores = preferences.cache_folder(), preferences.cores()
-    state = session.of(scene).state
+    state, known = session.of(scene).state, None
     if state is not None and not state.watch.look(scene) and state.catalogues == catalogues:
         if same_grid(settings, state.layout.settings):
             layout = replace(state.layout, settings=settings)
-            return _nothing_to_do(replace(state, layout=layout, grid_file=cache / state.grid_file.name, cores=cores))
+            known = replace(state, layout=layout, grid_file=cache / state.grid_file.name, cores=cores)
         reading, watching = SceneReading(state.layout.geometry, state.warnings), state.watch
     else:
         watching, reading = watch(scene), read_scene(scene)
     seconds = time.perf_counter() - began
 
     def steps() -> Generator[Progress, None, SceneState]:
+        if known is not None:
+            return known
         yield Progress(0, 0, "laying out the site")
         began = time.perf_counter()
         layout = lay_out(reading.geometry, settings, reading.warnings)
@@ -263,11 +265,6 @@ def with_placement(scene: bpy.types.Scene) -> Generator[Progress, None, SceneSta
     if not text:
         raise SeipError("there is no placement yet: place sensors first")
     return _restored(read_layout(scene), text)
-
-
-def _nothing_to_do(state: SceneState) -> Generator[Progress, None, SceneState]:
-    yield from ()
-    return state
 
 
 def with_grid_of(

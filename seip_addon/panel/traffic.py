@@ -139,7 +139,7 @@ class SEIP_OT_load_traffic(LongWork, bpy.types.Operator):
 def show_traffic(scene: bpy.types.Scene, trajectories: Trajectories, warnings: Sequence[str]) -> None:
     """Animate road users read from files, in place of earlier ones and of their scan, and note what there is."""
     animate(scene, trajectories)
-    scans.hide_cloud(scene)
+    scans.forget_scan(scene)
     begin, end = trajectories.span
     users = f"{counted(len(trajectories), 'road user')}, {begin:g} to {end:g} s"
     scene.seip.traffic.loaded = "\n".join((users, describe_categories(trajectories), *warnings))
@@ -156,7 +156,7 @@ class SEIP_OT_clear_traffic(ShortWork, bpy.types.Operator):
         """Take it out."""
         scene = context.scene
         clear_traffic(scene)
-        scans.hide_cloud(scene)
+        scans.forget_scan(scene)
         scene.seip.traffic.loaded = ""
 
 

@@ -191,7 +191,7 @@ def test_no_line_is_wider_than_its_room_and_no_letter_of_a_path_is_lost(scene, w
 
 def test_all_sections_open_without_and_with_a_placement(junction, monkeypatch):
     for name in [one.identifier for one in bpy.context.window_manager.seip_sections.bl_rna.properties]:
-        if not name.endswith("_state") and name not in {"rna_type", "name"}:
+        if name not in {"rna_type", "name"}:
             setattr(bpy.context.window_manager.seip_sections, name, True)
     monkeypatch.setattr(coverage, "shows_coverage", lambda _: True)  # there is no 3D view
     panel = SimpleNamespace(layout=DrawnLayout())
