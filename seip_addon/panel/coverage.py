@@ -1,25 +1,39 @@
-"""The coverage on the road, and all that the viewport shows of the results: colours, legend and sensor labels."""
+"""The coverage on the road: its colours and legend, labels of sensors, and sight lines of one sensor."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 
 import bpy
+import numpy as np
 from bpy.props import BoolProperty, EnumProperty
+from numpy.typing import NDArray
 
+from ..core.base.arrays import Float
+from ..core.base.errors import SeipError
 from ..core.choosing.placement.returns_summary import SURFACE_SEEN
-from ..core.output.pictures.palette import FORBIDDEN_VEIL, MANDATORY_VEIL, WEIGHTED_VEIL, rgb
+from ..core.output.pictures.palette import (
+    FORBIDDEN_VEIL,
+    HIDDEN_COLOUR,
+    MANDATORY_VEIL,
+    MISSED_COLOUR,
+    SIGHT_LINE,
+    WEIGHTED_VEIL,
+    rgb,
+)
+from ..core.sensing.visibility.sight_lines import SightLines, pose_at, sight_lines
 from ..scene import contract
 from ..scene.coverage_colours import colour_coverage
-from ..scene.sensors import placed_sensors
-from ..scene.write import ASPECT, aspects_of, coverage_of, shown_legend
-from . import overlays, scans, sight_lines
-from .layout import draw_reason, draw_sentence
-from .legend import Block, Entry, Label
-from .overlays import Overlay
-from .scene_status import no_placement
+from ..scene.sensors import placed_sensors, pose_of
+from ..scene.write import ASPECT, LIFT, aspects_of, coverage_of, shown_legend
+from . import overlays, scans
+from .layout import draw_reason, draw_run, draw_sentence
+from .legend import Block, Colour, Entry, Label
+from .overlays import Layer, Overlay
+from .scene_status import active_sensor, no_placement
 from .session import session
-from .work import ShortWork
+from .survey import with_placement
+from .work import ForPlacement, Job, LongWork, ShortWork
 
 NAME = "coverage"
 AREAS = (
@@ -37,6 +51,11 @@ ASPECTS = (
 )
 """Meanings of the road's colours, with their names and descriptions."""
 NO_COVERAGE = "There is no coverage to show: place sensors first."
+SIGHT_LINES = "sight lines"
+LINES: Colour = (*rgb(SIGHT_LINE), 0.30)
+HIDDEN: Colour = (*rgb(HIDDEN_COLOUR), 0.80)
+MISSED: Colour = (*rgb(MISSED_COLOUR), 0.80)
+ABOVE = LIFT + 0.02  # metres of the squares over the road: on the coverage, not in it
 
 
 def update(scene: bpy.types.Scene) -> None:
@@ -172,12 +191,65 @@ class SEIP_OT_hide_overlay(ShortWork, bpy.types.Operator):
         overlays.hide(context.scene, self.name)
 
 
+def sight_overlay(sight: SightLines, label: str) -> Overlay:
+    """Return the lines from a sensor to the targets that it sees, and squares on those that it does not."""
+    ends = sight.ends + np.array((0.0, 0.0, ABOVE))
+    lines = np.stack([np.broadcast_to(sight.eye, ends.shape), ends], axis=1).reshape(-1, 3)
+    layers = (
+        Layer("TRIS", _faces(sight.hidden), HIDDEN),
+        Layer("TRIS", _faces(sight.missed), MISSED),
+        Layer("LINES", lines.astype(np.float32), LINES),
+    )
+    drawn = "" if len(sight.ends) == sight.seen else f", {len(sight.ends):,} of them drawn"
+    block = Block(
+        f"{label}: {sight.in_range:,} targets in its range",
+        (
+            Entry(f"{sight.seen:,} seen{drawn}", (_opaque(LINES),)),
+            Entry(f"{len(sight.hidden):,} hidden by something", (_opaque(HIDDEN),)),
+            Entry(f"{len(sight.missed):,} in view, but between beams or too faint", (_opaque(MISSED),)),
+        ),
+    )
+    return Overlay(layers, lambda _scene: block)
+
+
+def _faces(squares: Float) -> NDArray[np.float32]:
+    """Return the two triangles of each square, (6 m, 3), above the road."""
+    corners = (squares + np.array((0.0, 0.0, ABOVE))).astype(np.float32)
+    faces: NDArray[np.float32] = corners[:, [0, 1, 2, 0, 2, 3]].reshape(-1, 3)
+    return faces
+
+
+def _opaque(colour: Colour) -> Colour:
+    return (*colour[:3], 1.0)
+
+
+class SEIP_OT_show_sight_lines(ForPlacement, LongWork, bpy.types.Operator):
+    """Draw lines from the sensor that is active in the list to the targets that it sees, and squares on those in its range that it does not see"""  # noqa: E501  # a tooltip is one line
+
+    bl_options = {"REGISTER"}  # nothing in the file changes
+
+    def job(self, scene: bpy.types.Scene) -> Job:
+        """Restore the placement, and draw them."""
+        scene, state = yield with_placement(scene)
+        session.of(scene).state = state
+        obj, label = active_sensor(scene), scene.seip.result.active_label()
+        survey, _ = state.placed()
+        key = str(obj.get(contract.SENSOR))
+        pose = pose_at(survey.site.candidates, key, *pose_of(obj))
+        if pose is None:
+            raise SeipError(f"{label} is not at a candidate pose: move it back, or place again")
+        settings = survey.settings
+        row = survey.grid.sees(pose)
+        sight = sight_lines(survey.site, pose, survey.models[key], row, settings.visibility.delta, settings.engine)
+        overlays.show(scene, SIGHT_LINES, sight_overlay(sight, label))
+
+
 def draw_view(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     """Draw what can be shown."""
     nothing = why_no_coverage(context.scene) and no_placement(context.scene)
     if not draw_reason(layout, "There is nothing to show yet." if nothing else ""):
         _draw_coverage(layout, context)
-        sight_lines.draw(layout, context)
+        _draw_sight(layout, context)
 
 
 def _draw_coverage(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
@@ -197,3 +269,14 @@ def _draw_coverage(layout: bpy.types.UILayout, context: bpy.types.Context) -> No
     if not draw_reason(column, why_no_coverage(context.scene)) and not shows_coverage(context.space_data):
         text = "This view's shading does not show the colours: press one of them."
         draw_sentence(column, text, icon="ERROR")
+
+
+def _draw_sight(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+    """Draw the button that shows the sight lines of the active sensor."""
+    column = layout.column(align=True)
+    column.label(text="Sight Lines")
+    label = context.scene.seip.result.active_label() or "Sensor"
+    draw_run(column, "seip.show_sight_lines", icon="LIGHT_SPOT", text=f"From {label}")
+    if overlays.find(context.scene, SIGHT_LINES) is not None:
+        column.operator("seip.hide_overlay", icon="X").name = SIGHT_LINES
+    draw_reason(column, no_placement(context.scene))

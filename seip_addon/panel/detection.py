@@ -86,16 +86,8 @@ class SEIP_OT_detect(LongWork, bpy.types.Operator):
 
     def job(self, scene: bpy.types.Scene) -> Job:
         """Save the scene as it is for the process that detects, and keep the figures with the scene."""
-        request, python = scene.seip.detection, preferences.detecting_python()
-        if python is None:
-            raise SeipError(NO_PYTHON)
-        job = DetectionJob(
-            python,
-            tuple(found_runs(runs_folder(scene.seip.traffic.runs))),
-            absolute(request.detector) if request.detector else None,
-            preferences.catalogue_files(),
-            scene.seip.survey.weather(),
-        )
+        request = scene.seip.detection
+        job = detection_job(scene, absolute(request.detector) if request.detector else None)
         folder = saved_path(request.folder, "the figures")
         sensors = sensors_key(scene)
         scene, result = yield started(_detected(job, folder))
@@ -105,6 +97,15 @@ class SEIP_OT_detect(LongWork, bpy.types.Operator):
             self.report({"WARNING"}, sentence)
         precision = found.average_precision[MAIN_RULE]
         self.report({"INFO"}, f"average precision {precision.average_precision:.1%}; written to {folder}")
+
+
+def detection_job(scene: bpy.types.Scene, detector: Path | None) -> DetectionJob:
+    """Return the job of detecting in the scene's runs of traffic, or raise a `SeipError` where something is missing."""
+    python = preferences.detecting_python()
+    if python is None:
+        raise SeipError(NO_PYTHON)
+    runs = tuple(found_runs(runs_folder(scene.seip.traffic.runs)))
+    return DetectionJob(python, runs, detector, preferences.catalogue_files(), scene.seip.survey.weather())
 
 
 def _detected(job: DetectionJob, folder: Path) -> Generator[Progress, None, str]:

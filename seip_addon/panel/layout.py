@@ -326,10 +326,7 @@ def fitting(urgent: list[str], result: tuple[str, ...], title: float) -> str | N
     str or None
         None if the urgent parts have no room as words.
     """
-    region, text = bpy.context.region, BETWEEN.join(urgent)
-    if region is None:
-        return BETWEEN.join((*urgent, *result))
-    room = region.width / (bpy.context.preferences.system.ui_scale or 1.0) - MARGIN - ARROW - title - GAP * UNIT
+    text, room = BETWEEN.join(urgent), sidebar_width() - MARGIN - ARROW - title - GAP * UNIT
     if text_width(text) > room:
         return None
     for part in result:

@@ -30,8 +30,8 @@ from ..core.workflows.survey import Layout
 from ..core.workflows.traffic_runs import TrafficRuns, found_runs, read_runs
 from ..scene.sensors import labelled_sensors
 from ..scene.write import write_result
-from . import coverage, overlays, preferences, scene_status
-from .detection import NO_PYTHON, no_python, saved_scene
+from . import coverage, overlays, scene_status
+from .detection import detection_job, no_python, saved_scene
 from .layout import (
     BETWEEN,
     BOX,
@@ -155,14 +155,10 @@ class SEIP_OT_judge_placement(_Placing, bpy.types.Operator):
 
     def job(self, scene: bpy.types.Scene) -> Job:
         """Read the scene where it has changed, save it for the process that judges, and place sensors."""
-        seip, python = scene.seip, preferences.detecting_python()
-        if python is None:
-            raise SeipError(NO_PYTHON)
-        objective = seip.goal.objective()
+        objective = scene.seip.goal.objective()
         check_judged(objective)
-        runs = tuple(found_runs(runs_folder(seip.traffic.runs)))
-        job = DetectionJob(python, runs, None, preferences.catalogue_files(), seip.survey.weather())
-        folder = saved_path(seip.detection.folder, "the detections")
+        job = detection_job(scene, None)
+        folder = saved_path(scene.seip.detection.folder, "the detections")
         self.acceptance = Acceptance()
         steps = _judged(read_layout(scene), objective, job, folder, self.acceptance)
         scene, state = yield started(steps)

@@ -22,6 +22,7 @@ from ..core.sensing.visibility.ray_casting import MAX_THREADS
 from ..core.workflows.detection import INSTALL, DetectingPython
 from ..core.world.openstreetmap.overpass import EXPORT, OVERPASS, OverpassServer
 from .layout import draw_run, draw_sentence
+from .properties import absolute
 from .work import Job, LongWork, Outcome
 
 ADDON_ID = (__package__ or "").removesuffix(".panel").removesuffix(".seip_addon")
@@ -38,7 +39,7 @@ Value = TypeVar("Value")
 def cache_folder() -> Path:
     """Return the folder in which visibility is kept."""
     named = _given("cache", "")
-    return Path(bpy.path.abspath(named)) if named else _own_folder("visibility")
+    return absolute(named) if named else _own_folder("visibility")
 
 
 def _own_folder(name: str) -> Path:
@@ -51,7 +52,7 @@ def _own_folder(name: str) -> Path:
 def detecting_python() -> DetectingPython | None:
     """Return the Python that detection runs in, or None where nobody has named one and this one cannot be it."""
     if named := _given("python", ""):
-        program = Path(bpy.path.abspath(named)).absolute()  # not resolved: .venv/bin/python is a link
+        program = absolute(named).absolute()  # not resolved: .venv/bin/python is a link
         return DetectingPython(program, program.parent.parent.parent)
     project = find_spec("headless")
     if bpy.app.module and project is not None and project.origin is not None and find_spec("torch") is not None:
@@ -62,7 +63,7 @@ def detecting_python() -> DetectingPython | None:
 def sumo_folders() -> tuple[Path, ...]:
     """Return the folders that are searched for SUMO first: the one in the preferences, then the extension's own."""
     named = _given("sumo", "")
-    return (*((Path(bpy.path.abspath(named)),) if named else ()), installed_sumo(own_sumo_folder()))
+    return (*((absolute(named),) if named else ()), installed_sumo(own_sumo_folder()))
 
 
 def own_sumo_folder() -> Path:
@@ -129,7 +130,7 @@ def cores() -> int | None:
 def catalogue_files() -> tuple[Path, ...]:
     """Return the user's own catalogues."""
     files: Any = _given("catalogues", ())
-    return tuple(Path(bpy.path.abspath(file.path)) for file in files if file.path)
+    return tuple(absolute(file.path) for file in files if file.path)
 
 
 def catalogue() -> dict[str, LidarModel]:

@@ -1,10 +1,11 @@
-"""The section "Results": the placement that the file keeps, its sensors, and their evaluation where they stand."""
+"""The section "Results": the placement that the file keeps, its sensors, and comparison with placements before."""
 
 from __future__ import annotations
 
 from collections.abc import Generator, Mapping, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
+from itertools import count
 
 import bpy
 from bpy.props import BoolProperty, CollectionProperty, IntProperty, StringProperty
@@ -13,7 +14,8 @@ from mathutils import Vector
 from ..core.base.errors import SeipError
 from ..core.base.progress import Progress
 from ..core.choosing.placement.objective import Objective
-from ..core.output.pictures.colours import packed_counts
+from ..core.choosing.placement.returns_summary import returns_text
+from ..core.output.pictures.colours import compare, packed_counts, unpacked_counts
 from ..core.output.results.answer import answer, change_text
 from ..core.output.results.placement_record import PlacementRecord, Provenance, parsed_record
 from ..core.output.results.versions import versions
@@ -23,15 +25,15 @@ from ..core.storage.files import digest
 from ..core.workflows.moved_sensors import BY_HAND, evaluate_moved_sensors
 from ..core.workflows.records import record_of
 from ..scene import contract
+from ..scene.coverage_colours import recolour
 from ..scene.sensors import labelled_sensors, placed_sensors, read_sensors
-from ..scene.write import coverage_of, take_over
+from ..scene.write import aspects_of, coverage_of, take_over
 from . import following, preferences, scene_status
-from .comparison import draw_comparison
 from .coverage import draw_view
 from .following import draw_followed
-from .layout import RowList, draw_list, draw_reason, draw_run, draw_sections
-from .properties import path_property
-from .scene_status import active_sensor, no_placement
+from .layout import RowList, draw_list, draw_reason, draw_run, draw_sections, draw_sentence
+from .properties import complaint, path_property
+from .scene_status import active_sensor, no_placement, not_evaluated
 from .session import SceneState, session
 from .survey import read_layout, with_grid_of, with_visibility
 from .work import ForPlacement, ForReadyScene, Job, LongWork, ShortWork, select_alone
@@ -40,6 +42,7 @@ EYE_DISTANCE = 10.0
 """Metres from a sensor's eye to the point that the view turns about."""
 SENSOR_SHARE = 0.72
 """Share of a row of the list that a sensor takes, beside what it sees."""
+OTHER_TARGETS = "The two placements were made on different targets: only their figures can be compared."
 
 
 class SEIP_PG_chosen(bpy.types.PropertyGroup):
@@ -197,6 +200,62 @@ class SEIP_UL_chosen(RowList, bpy.types.UIList):
         row.label(text=f"{sensor.coverage_alone:.1%}")
 
 
+class SEIP_OT_keep_placement(ForPlacement, ShortWork, bpy.types.Operator):
+    """Keep the present placement, to compare later ones with it; its name in the list can be changed"""
+
+    bl_options = {"REGISTER", "UNDO"}
+
+    name: bpy.props.StringProperty(name="Name", description="Name of the kept placement; numbered if empty")
+
+    obstacles = (*ForPlacement.obstacles, not_evaluated)
+
+    def act(self, context: bpy.types.Context) -> None:
+        """Keep it, in place of another of that name."""
+        seip = context.scene.seip
+        free = (f"Placement {number}" for number in count(1))
+        name = self.name.strip() or next(name for name in free if name not in seip.kept)
+        entry = seip.kept.get(name) or seip.kept.add()
+        entry.name = name
+        for field in ("record", "targets", "seen"):
+            setattr(entry, field, getattr(seip.result, field))
+        seip.active_kept = seip.kept.find(name)
+
+
+class SEIP_OT_show_comparison(ForPlacement, ShortWork, bpy.types.Operator):
+    """Colour the road by the placements that see it: both, only the kept one, only the present one or neither"""
+
+    bl_label = "Show Difference"
+    bl_options = {"REGISTER", "UNDO"}
+
+    def act(self, context: bpy.types.Context) -> None:
+        """Colour the road."""
+        scene = context.scene
+        seip = scene.seip
+        if not 0 <= seip.active_kept < len(seip.kept):
+            raise SeipError("keep a placement first, to compare the present one with it")
+        kept = seip.kept[seip.active_kept]
+        if kept.targets != seip.result.targets:
+            raise SeipError(OTHER_TARGETS)
+        recolour(scene, compare(unpacked_counts(kept.seen), unpacked_counts(seip.result.seen)))
+        scene.seip.view.legend = True
+
+
+class SEIP_UL_kept(RowList, bpy.types.UIList):
+    """Placements that were kept."""
+
+    def draw_row(self, layout: bpy.types.UILayout, item: bpy.types.PropertyGroup) -> None:
+        """Draw a name that can be changed."""
+        layout.prop(item, "name", text="", emboss=False)
+
+
+def _returns(record: PlacementRecord) -> str:
+    return "–" if record.returns is None else returns_text(record.returns.typical)
+
+
+def _share(value: float | None) -> str:
+    return "–" if value is None else f"{value:.2%}"
+
+
 def draw(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     """Draw the sensors and how they are followed when moved, then the closed sections."""
     scene = context.scene
@@ -216,4 +275,42 @@ def draw(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     else:
         layout.operator("seip.follow_sensors", text="Stop Following", icon="PAUSE", depress=True)
         draw_followed(layout, session.following)
-    draw_sections(layout, {"view": draw_view, "comparison": draw_comparison}, context)
+    draw_sections(layout, {"view": draw_view, "comparison": _draw_comparison}, context)
+
+
+def _draw_comparison(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+    """Draw the kept placements, and the present one beside the active one of them."""
+    seip = context.scene.seip
+    row = layout.row()
+    draw_list(row, SEIP_UL_kept, seip, "kept", "active_kept")
+    column = row.column(align=True)
+    column.operator("seip.keep_placement", text="", icon="ADD")
+    column.operator("seip.remove_entry", text="", icon="REMOVE").of = "KEPT"
+    if not 0 <= seip.active_kept < len(seip.kept):
+        draw_sentence(layout, "Keep this placement with +, place again, and compare the two.", icon="INFO")
+        return
+    kept, present = seip.kept[seip.active_kept], seip.result
+    if draw_reason(layout, complaint(lambda: parsed_record(kept.record))):
+        return
+    _draw_table(layout, parsed_record(kept.record), parsed_record(present.record))
+    if draw_reason(layout, OTHER_TARGETS if kept.targets != present.targets else ""):
+        return
+    layout.operator("seip.show_comparison")
+    if (obj := coverage_of(context.scene)) is not None:
+        layout.operator("seip.colour_coverage", text="Show Coverage").aspect = aspects_of(obj)[0]
+
+
+def _draw_table(layout: bpy.types.UILayout, kept: PlacementRecord, present: PlacementRecord) -> None:
+    grid = layout.grid_flow(row_major=True, columns=3, even_columns=True, align=True)
+    for text in ("", "Kept", "Present"):
+        grid.label(text=text)
+    returns = ("Returns", _returns(kept), _returns(present))
+    for name, one, other in (
+        *([returns] if kept.returns or present.returns else []),
+        ("Road Seen", _share(kept.coverage.whole), _share(present.coverage.whole)),
+        ("Central", _share(kept.coverage.central), _share(present.coverage.central)),
+        ("Price", kept.price_text, present.price_text),
+        ("Sensors", str(len(kept.sensors)), str(len(present.sensors))),
+    ):
+        for text in (name, one, other):
+            grid.label(text=text)

@@ -1,46 +1,63 @@
-"""The step "Sensors": the table of products, those to choose from, catalogues, mounting heights and tilts."""
+"""The step "Sensors": the table of products, those to choose from, catalogues, heights and tilts, and their beams."""
 
 from __future__ import annotations
 
 import math
-from pathlib import Path
+from functools import lru_cache
 
 import bpy
+import numpy as np
 
 from ..core.base.errors import SeipError
+from ..core.output.pictures.palette import DENSE_BEAMS, PAPER, WIDE_BEAMS, rgb
 from ..core.output.results.placement_record import parsed_record
 from ..core.sensing.lidar.catalogue import load_catalogue
 from ..core.sensing.lidar.model import LidarModel
+from ..core.sensing.lidar.rings import beam_rings
 from ..core.sensing.returns.bodies import PANELS
 from ..core.sensing.visibility.ring_resolution import unresolved_from
 from ..core.sensing.visibility.road_range import road_range, upright_range
 from ..core.sensing.visibility.settings import VisibilitySettings
 from ..core.site.candidates import DEFAULT_TYPE
+from ..scene import contract
 from ..scene.materials import REFLECTIVITY
-from . import preferences
-from .beams import draw_beams
+from . import overlays, preferences
 from .layout import Status, draw_sections, draw_sentence, is_narrow, settings_column
+from .legend import Block, Entry
+from .overlays import Layer, Overlay
+from .properties import absolute
 from .scene_status import no_placement
 from .session import session
 from .work import Outcome, ShortWork
 
-PAPER = "generic"
+GENERIC = "generic"
 """Manufacturer of the types of the SEIP paper, which are models, not products."""
 TABLE_WIDTH, TABLE_MARGIN = 760, 40
 """Width of the table, and of the window beside it, pixels at the usual scale of the interface."""
 COLUMNS = (("Sensor", 0.40), ("Channels", 0.11), ("Field of view", 0.14), ("Pedestrian", 0.12), ("Price", 0.11))
 """Titles and shares of the width; the rest shows what the detection law rests on."""
+BEAMS = "beams"
+DENSE, WIDE, CONE = (*rgb(DENSE_BEAMS), 0.9), (*rgb(WIDE_BEAMS), 0.9), (*rgb(PAPER), 0.35)
+"""Colours of rings within 2δ of the next, of others, and of the edges of the field of view."""
+WIDTH = 1.5  # pixels at the interface's usual scale
+UPRIGHT = 1e-5  # radians
+LIFT = 0.05  # metres of the rings above the road
+Preview = tuple[LidarModel, tuple[float, ...], float, float]
+"""Sensor whose beams are shown: model, the 16 entries of the matrix from its axes to the scene's, height above the road
+in metres, and δ in metres."""
+Beams = tuple[tuple[Layer, ...], Block]
+"""Lines of the beams, and what their colours mean."""
 
 
 def title(model: LidarModel) -> str:
     """Return manufacturer and product; of the paper's types, the name alone."""
-    return model.name if model.manufacturer == PAPER else f"{model.manufacturer} {model.name}"
+    return model.name if model.manufacturer == GENERIC else f"{model.manufacturer} {model.name}"
 
 
 def in_order() -> list[str]:
     """Return the keys of all types by manufacturer and product, the paper's last."""
     types = session.sensor_types
-    return sorted(types, key=lambda key: (types[key].manufacturer == PAPER, title(types[key]).casefold()))
+    return sorted(types, key=lambda key: (types[key].manufacturer == GENERIC, title(types[key]).casefold()))
 
 
 def refresh() -> None:
@@ -95,7 +112,7 @@ class SEIP_OT_add_catalogue(ShortWork, bpy.types.Operator):
 
     def act(self, context: bpy.types.Context) -> None:
         """Read it, and keep its name."""
-        path = Path(bpy.path.abspath(self.filepath))
+        path = absolute(self.filepath)
         shipped = load_catalogue()
         models = load_catalogue([path])
         if path in preferences.catalogue_files():
@@ -151,19 +168,6 @@ class SEIP_OT_choose_sensors(bpy.types.Operator):
         layout.operator("seip.add_catalogue", icon="ADD")
 
 
-def draw_table(layout: bpy.types.UILayout, survey: bpy.types.PropertyGroup) -> None:
-    """Draw the titles, and a row for each product whose name contains the filter."""
-    wanted = survey.filter.casefold()
-    shown = [key for key in in_order() if wanted in f"{key} {_title_of(key)}".casefold()]
-    _row(layout, None, (*(title for title, _ in COLUMNS), "Detection law"))
-    column = layout.column(align=True)
-    column.scale_y = 0.85
-    for key in shown:
-        _row(column, survey.types.get(key), _cells(session.sensor_types[key]))
-    if not shown:
-        column.label(text="No product has this in its name.", icon="INFO")
-
-
 def _row(layout: bpy.types.UILayout, item: bpy.types.PropertyGroup | None, cells: tuple[str, ...]) -> None:
     rest, left = layout.row(align=True), 1.0
     for number, text in enumerate(cells):
@@ -195,7 +199,7 @@ def _cells(model: LidarModel) -> tuple[str, ...]:
 
 
 def _law(model: LidarModel) -> str:
-    if model.manufacturer == PAPER:
+    if model.manufacturer == GENERIC:
         return "paper's model"
     if model.calibration:
         return "calibrated"
@@ -234,6 +238,106 @@ def _span(heights: list[float]) -> str:
     return f"{low:g} m" if low == high else f"{low:g}–{high:g} m"
 
 
+def _on_road(model: LidarModel, heights: list[float], delta: float) -> list[tuple[str, str]]:
+    """Return the range on the road, and where the rings of the beams begin to leave gaps, for the greatest height."""
+    if not heights:
+        return []
+    height = max(heights)
+    far = road_range(model, REFLECTIVITY["asphalt"], height, VisibilitySettings())
+    across = math.sqrt(max(model.max_range**2 - height**2, 0.0))
+    dense = unresolved_from(model, height, delta, across)
+    lines = [("Height", f"{height:g} m"), ("On dry asphalt", f"up to {far:.0f} m")]
+    if dense < across:
+        lines.append(("Rings close", f"up to {dense:.0f} m, then gaps"))
+    return lines
+
+
+def _preview() -> Preview | None:
+    """Return whose beams to show: the active sensor's, else the active type's at the 3D cursor; None if unknown."""
+    scene, active = bpy.context.scene, bpy.context.object
+    survey = scene.seip.survey
+    height = float(survey.preview_height)
+    if active is not None and active.get(contract.SENSOR) in session.sensor_types:
+        model = session.sensor_types[active[contract.SENSOR]]
+        matrix, height = np.array(active.matrix_world), float(active.get("seip_height", height))
+    elif survey.shown_type() in session.sensor_types:
+        model, matrix = session.sensor_types[survey.shown_type()], np.eye(4)
+        matrix[:3, 3] = np.add(scene.cursor.location, (0.0, 0.0, height))
+    else:
+        return None
+    return model, tuple(matrix.ravel().tolist()), height, float(survey.delta)
+
+
+@lru_cache(maxsize=1)  # until the sensor, its pose or δ changes
+def _beams(
+    model: LidarModel, matrix: tuple[float, ...], height: float, delta: float
+) -> tuple[tuple[Layer, ...], Block]:
+    """Return the beams of a sensor.
+
+    Up to the radius in the legend all rings before the sensor are within 2δ of each other; of a rosette, all road in
+    view has a ray of the frame within δ.
+    """
+    placed = np.array(matrix).reshape(4, 4)
+    axes = placed[:3, :3] / np.maximum(np.linalg.norm(placed[:3, :3], axis=0), 1e-9)
+    tilt = math.asin(max(-1.0, min(1.0, -float(axes[2, 0]))))
+    tilt = tilt if abs(tilt) > UPRIGHT else 0.0  # single precision cannot tell it from 0
+    across = math.sqrt(max(model.max_range**2 - height**2, 0.0))
+    resolved = unresolved_from(model, height, delta, across, tilt)
+    lines = beam_rings(model, placed[:3, 3], axes, float(placed[2, 3]) - height + LIFT, 2 * delta, resolved)
+    pieces = ((lines.cone, CONE), (lines.rings[lines.wide], WIDE), (lines.rings[~lines.wide], DENSE))
+    rosette = model.rosette is not None
+    dense = f"at most {delta if rosette else 2 * delta:.3g} m to {'a ray' if rosette else 'the next ring inwards'}"
+    where = f"{'in front ' if tilt else ''}up to {resolved:.0f} m"
+    return tuple(
+        Layer("LINES", piece.reshape(-1, 3).astype(np.float32), colour, WIDTH) for piece, colour in pieces if len(piece)
+    ), Block(
+        f"{model.name} at {height:.3g} m: no gaps on a level road {where}",
+        (
+            Entry(dense, (DENSE,)),
+            Entry("more: road between may go unseen", (WIDE,)),
+            Entry("edge of the field of view", (CONE,)),
+        ),
+    )
+
+
+def beam_overlay() -> Overlay:
+    """Return the beams of the sensor that is active when the view is drawn."""
+
+    def legend(_scene: bpy.types.Scene) -> Block | None:
+        preview = _preview()
+        return None if preview is None else _beams(*preview)[1]
+
+    def layers() -> tuple[Layer, ...]:
+        preview = _preview()
+        return () if preview is None else _beams(*preview)[0]
+
+    return Overlay((), legend, moving=layers)
+
+
+class SEIP_OT_preview_beams(ShortWork, bpy.types.Operator):
+    """Show or hide the beams of the selected sensor, or else of the sensor shown in the sidebar at the 3D cursor: rings on a flat road and the edges of the vertical field of view"""  # noqa: E501  # a tooltip is one line
+
+    def act(self, context: bpy.types.Context) -> None:
+        """Show or hide them."""
+        if overlays.find(context.scene, BEAMS):
+            overlays.hide(context.scene, BEAMS)
+        else:
+            overlays.show(context.scene, BEAMS, beam_overlay())
+
+
+def draw_table(layout: bpy.types.UILayout, survey: bpy.types.PropertyGroup) -> None:
+    """Draw the titles, and a row for each product whose name contains the filter."""
+    wanted = survey.filter.casefold()
+    shown = [key for key in in_order() if wanted in f"{key} {_title_of(key)}".casefold()]
+    _row(layout, None, (*(title for title, _ in COLUMNS), "Detection law"))
+    column = layout.column(align=True)
+    column.scale_y = 0.85
+    for key in shown:
+        _row(column, survey.types.get(key), _cells(session.sensor_types[key]))
+    if not shown:
+        column.label(text="No product has this in its name.", icon="INFO")
+
+
 def draw(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     """Draw the chosen products, and the heights and tilts at which they may be mounted."""
     survey = context.scene.seip.survey
@@ -247,7 +351,7 @@ def draw(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
         draw_sentence(column, "Choose at least one sensor.", icon="ERROR", alert=True)
     layout.operator(SEIP_OT_choose_sensors.bl_idname, icon="ADD")
     _draw_mounting(layout, context)
-    draw_sections(layout, {"about_sensor": _draw_about, "beams": draw_beams}, context)
+    draw_sections(layout, {"about_sensor": _draw_about, "beams": _draw_beams}, context)
 
 
 def _draw_product(layout: bpy.types.UILayout, key: str) -> None:
@@ -299,15 +403,9 @@ def _draw_about(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     draw_sentence(layout, f"Price: {model.price_source or 'no source'}")
 
 
-def _on_road(model: LidarModel, heights: list[float], delta: float) -> list[tuple[str, str]]:
-    """Return the range on the road, and where the rings of the beams begin to leave gaps, for the greatest height."""
-    if not heights:
-        return []
-    height = max(heights)
-    far = road_range(model, REFLECTIVITY["asphalt"], height, VisibilitySettings())
-    across = math.sqrt(max(model.max_range**2 - height**2, 0.0))
-    dense = unresolved_from(model, height, delta, across)
-    lines = [("Height", f"{height:g} m"), ("On dry asphalt", f"up to {far:.0f} m")]
-    if dense < across:
-        lines.append(("Rings close", f"up to {dense:.0f} m, then gaps"))
-    return lines
+def _draw_beams(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+    """Draw the button; the legend in the view says what the colours of the rings mean."""
+    shown = overlays.find(context.scene, BEAMS) is not None
+    settings_column(layout).prop(context.scene.seip.survey, "preview_height")
+    text = "Hide Beams" if shown else "Show Beams"
+    layout.operator("seip.preview_beams", text=text, icon="LIGHT_SPOT", depress=shown)

@@ -251,28 +251,14 @@ class LastScan:
         self.facts = tuple(lines)
 
 
-@dataclass(frozen=True, eq=False)
-class LastVerification:
-    """The installation compared with the plan.
-
-    Parameters
-    ----------
-    watch : Watch
-        Whether the scene has changed since.
-    """
-
-    found: Verification
-    watch: Watch
-
-
 @dataclass
 class SceneMemory:
-    """What is known of a scene: its state, check, last scan and last verification."""
+    """What is known of a scene: its state, check, last scan, and last verification with changes of the scene since."""
 
     state: SceneState | None = None
     check: CheckedScene | None = None
     scan: LastScan | None = None
-    verification: LastVerification | None = None
+    verification: tuple[Verification, Watch] | None = None
 
 
 @dataclass

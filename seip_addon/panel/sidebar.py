@@ -15,7 +15,6 @@ from . import (
     scans,
     scene_status,
     sensors,
-    simulation,
     site,
     site_check,
     traffic,
@@ -27,10 +26,9 @@ from .layout import Sidebar, Status, draw_sections
 from .objective import SEIP_PG_goal
 from .results import SEIP_PG_placement, SEIP_PG_result
 from .scene_status import FILE_VERSION
-from .simulation import SEIP_PG_simulation
 from .site import EXTRACTS, SEIP_PG_site
 from .survey import SEIP_PG_survey
-from .traffic import SEIP_PG_traffic
+from .traffic import SEIP_PG_simulation, SEIP_PG_traffic
 from .verification import SEIP_PG_verification
 
 STEPS: tuple[tuple[str, ...], ...] = (
@@ -128,7 +126,7 @@ def draw_traffic(layout: bpy.types.UILayout, context: bpy.types.Context) -> None
     """Draw traffic, and the sections of all that is done with it."""
     traffic.draw(layout, context)
     parts = {
-        "simulation": simulation.draw,
+        "simulation": traffic.draw_simulation,
         "scan": scans.draw_scan,
         "dataset": scans.draw_dataset,
         "detection": detection.draw,
@@ -139,8 +137,11 @@ def draw_traffic(layout: bpy.types.UILayout, context: bpy.types.Context) -> None
 
 def _traffic(scene: bpy.types.Scene) -> dict[str, Status]:
     """Return the status of each section below traffic that has one."""
-    parts = {"simulation": simulation, "detection": detection, "verification": verification}
-    return {name: part.status(scene) for name, part in parts.items()}
+    return {
+        "simulation": traffic.simulation_status(scene),
+        "detection": detection.status(scene),
+        "verification": verification.status(scene),
+    }
 
 
 class SEIP_FH_map(bpy.types.FileHandler):

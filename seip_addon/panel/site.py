@@ -177,7 +177,7 @@ class SEIP_OT_choose_map(WritesScene, LongWork, bpy.types.Operator):
 
     def job(self, scene: bpy.types.Scene) -> Job:
         """Read the file, list its junctions in place of those of another file, and ask for the place."""
-        scene, found = yield site_places(Path(bpy.path.abspath(self.filepath)))
+        scene, found = yield site_places(absolute(self.filepath))
         site = scene.seip.site
         _list_places(site, self.filepath, found)
         self.report({"INFO"}, counted(len(site.junctions), "junction"))
@@ -291,7 +291,7 @@ class SEIP_OT_build_site(_BuildsSite, bpy.types.Operator):
     def job(self, scene: bpy.types.Scene) -> Job:
         """Build what was chosen."""
         site = scene.seip.site
-        self._build(*(yield build_site(Path(bpy.path.abspath(site.source)), site.request())))
+        self._build(*(yield build_site(absolute(site.source), site.request())))
 
 
 class SEIP_OT_load_example(_BuildsSite, bpy.types.Operator):

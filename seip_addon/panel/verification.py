@@ -32,7 +32,7 @@ from .detection import folder_of_result
 from .layout import BOX, Status, draw_path, draw_reason, draw_run, draw_sentence
 from .properties import absolute, path_property, saved_path
 from .scene_status import no_folder, no_sensors
-from .session import LastVerification, session
+from .session import session
 from .work import Job, LongWork, ShortWork
 
 NO_RECORDING = "Name a recording of the installed sensors: a folder of sweeps, or a .pcap."
@@ -65,7 +65,7 @@ def why_no_correction(scene: bpy.types.Scene) -> str:
     last = session.of(scene).verification
     if last is None:
         return NOT_VERIFIED
-    return CHANGED if last.watch.changed else ""
+    return CHANGED if last[1].changed else ""
 
 
 def sentences_of(scene: bpy.types.Scene) -> tuple[str, ...]:
@@ -110,7 +110,7 @@ class SEIP_OT_verify(LongWork, bpy.types.Operator):
             with whole_file(folder / name) as temporary:
                 temporary.write_bytes(content)
         scene.seip.verification.found = "\n".join(summary(record_of(scene.name, "", found)))
-        session.of(scene).verification = LastVerification(found, watching)
+        session.of(scene).verification = (found, watching)
         for sentence in found.warnings:
             self.report({"WARNING"}, sentence)
         self.report({"INFO"}, f"verified; written to {folder}")
@@ -149,8 +149,9 @@ class SEIP_OT_correct_scene(ShortWork, bpy.types.Operator):
         if last is None:
             raise SeipError(NOT_VERIFIED)
         following.stop()
-        problems = correct_scene(scene, last.found)
-        last.watch.look(scene)  # so that nothing is added twice
+        found, changes = last
+        problems = correct_scene(scene, found)
+        changes.look(scene)  # so that nothing is added twice
         for sentence in problems:
             self.report({"WARNING"}, sentence)
         self.report({"INFO"}, "the scene is as recorded; its placement is stale")

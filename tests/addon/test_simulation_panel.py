@@ -9,8 +9,8 @@ from headless import traffic
 import bpy
 import pytest
 
-from seip_addon.panel import simulation as panel
-from seip_addon.panel.simulation import SEIP_OT_simulate_traffic
+from seip_addon.panel import traffic as panel
+from seip_addon.panel.traffic import SEIP_OT_simulate_traffic
 from tests.builders.drawn_layout import DrawnLayout
 from tests.builders.osm_text import crossing
 from tests.sumo_here import needs_sumo
@@ -35,7 +35,7 @@ def short(scene):
 
 def drawn():
     layout = DrawnLayout()
-    panel.draw(layout, bpy.context)
+    panel.draw_simulation(layout, bpy.context)
     return layout
 
 

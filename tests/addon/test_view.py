@@ -6,9 +6,9 @@ import pytest
 
 import seip_addon
 from seip_addon.panel import overlays
+from seip_addon.panel.coverage import SIGHT_LINES as SIGHT
 from seip_addon.panel.coverage import legend_of_coverage
 from seip_addon.panel.session import session
-from seip_addon.panel.sight_lines import NAME as SIGHT
 from seip_addon.scene.sensors import placed_sensors
 
 
