@@ -42,22 +42,34 @@ from ..scene.changes import Watch
 Result = TypeVar("Result")
 
 
-class Background(Generic[Result]):
-    """Runs steps in a thread of its own, from now on.
+class RunningWork(Generic[Result]):
+    """Work of an operator, which runs in a thread of its own from now on.
 
     Parameters
     ----------
+    operator : str
+        Its ``bl_idname``.
     steps : generator of Progress
         Stopped at its next report, and closed, once somebody asks for that.
+    acceptance : Acceptance, optional
+        Ends a search with the best placement found so far.
 
     Attributes
     ----------
     progress : Progress
         The last report.
+    shown : (Progress, str)
+        Progress and time that are shown; see `progress_line`.
+    timer : bpy.types.Timer or None
+        Has somebody look at it from time to time.
     """
 
-    def __init__(self, steps: Generator[Progress, None, Result]) -> None:
+    def __init__(
+        self, operator: str, steps: Generator[Progress, None, Result], acceptance: Acceptance | None = None
+    ) -> None:
+        self.operator, self.acceptance = operator, acceptance
         self.progress = Progress(0, 0, "starting")
+        self.shown, self.timer = (self.progress, ""), None
         self._stop = threading.Event()
         self._end: Future[Result] = Future()
         self._thread = threading.Thread(target=self._run, args=(steps,), daemon=True)
@@ -72,6 +84,11 @@ class Background(Generic[Result]):
         """Return the result, or raise what went wrong; waits for the end."""
         return self._end.result()
 
+    @property
+    def stopped(self) -> bool:
+        """Whether somebody has asked the work to end."""
+        return self._stop.is_set()
+
     def stop(self) -> None:
         """Ask the work to end at its next report, and return at once."""
         self._stop.set()
@@ -84,7 +101,7 @@ class Background(Generic[Result]):
     def _run(self, steps: Generator[Progress, None, Result]) -> None:
         def report(progress: Progress) -> None:
             self.progress = progress
-            if self._stop.is_set():
+            if self.stopped:
                 raise CancelledError
 
         try:
@@ -162,30 +179,6 @@ class CheckedScene:
     found: SiteCheck
     watch: Watch
     settings: SurveySettings | str
-
-
-@dataclass
-class RunningWork:
-    """Work that is under way.
-
-    Parameters
-    ----------
-    operator : str
-        Its ``bl_idname``.
-    shown : (Progress, str)
-        Progress and time that are shown; see `progress_line`.
-    timer : bpy.types.Timer or None
-        Has somebody look at it from time to time.
-    acceptance : Acceptance, optional
-        Ends a search with the best placement found so far.
-    """
-
-    operator: str
-    work: Background[Any]
-    shown: tuple[Progress, str] = (Progress(0, 0, "starting"), "")
-    timer: bpy.types.Timer | None = None
-    stop: bool = False
-    acceptance: Acceptance | None = None
 
 
 Followed = tuple[MountedSensor, Boolean, NDArray[np.float32] | None]
@@ -282,7 +275,7 @@ class Session:
     scenes: dict[int, SceneMemory] = field(default_factory=dict)
     sensor_types: dict[str, LidarModel] = field(default_factory=dict)
     catalogue_error: str = ""
-    running: RunningWork | None = None
+    running: RunningWork[Any] | None = None
     following: FollowedSensors | None = None
 
     def of(self, scene: bpy.types.Scene) -> SceneMemory:

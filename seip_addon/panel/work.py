@@ -17,7 +17,7 @@ from ..core.base.errors import SeipError
 from ..core.base.progress import Progress, finish, progress_line, reporter
 from . import scene_status
 from .scene_status import no_placement
-from .session import Background, RunningWork, scene_of, session
+from .session import RunningWork, scene_of, session
 
 REPORT_WIDTH = 72
 """Letters in a line of an error."""
@@ -157,20 +157,20 @@ class LongWork(Conditional):
         """Show the progress on timer events, and conclude once the work has ended."""
         if event.type != "TIMER":
             return {"PASS_THROUGH"}
-        if self._running is not session.running or self._running.stop:
+        if self._running is not session.running or self._running.stopped:
             self._end(context)
             self.report({"INFO"}, self.stopped_message)  # type: ignore[attr-defined]  # of Blender's operators
             return {"CANCELLED"}
-        if not self._running.work.ended:
-            self._report(self._running.work.progress)
+        if not self._running.ended:
+            self._report(self._running.progress)
             return {"PASS_THROUGH"}
         self._end(context)
-        return attempt(self, lambda: _conclude(self._job, scene_of(self._scene), self._running.work.result()))
+        return attempt(self, lambda: _conclude(self._job, scene_of(self._scene), self._running.result()))
 
     def cancel(self, context: bpy.types.Context) -> None:
         """Stop because Blender quits, closes the window or opens another file, so that no thread outlives its data."""
         self._end(context)
-        self._running.work.join(JOIN_TIMEOUT)
+        self._running.join(JOIN_TIMEOUT)
 
     def _start(self, context: bpy.types.Context) -> None:
         if session.running is not None:
@@ -178,8 +178,7 @@ class LongWork(Conditional):
         self._scene = context.scene.session_uid
         name = type(self).bl_idname  # of the class, as panels spell it: Blender gives the instance's as SEIP_OT_…
         self._job = self.job(context.scene)
-        work = Background(next(self._job))
-        self._running = session.running = RunningWork(name, work, acceptance=self.acceptance)
+        self._running = session.running = RunningWork(name, next(self._job), self.acceptance)
         self._report = reporter(self._show, SHOW_INTERVAL)
         self._running.timer = context.window_manager.event_timer_add(TIMER_INTERVAL, window=context.window)
         context.window_manager.modal_handler_add(self)
@@ -209,9 +208,9 @@ def _say(context: bpy.types.Context, text: str | None) -> None:
         context.workspace.status_text_set(text)
 
 
-def _stop(running: RunningWork) -> None:
+def _stop(running: RunningWork[Any]) -> None:
     """Ask work to stop, remove its timer and free the session for other work."""
-    running.work.stop()
+    running.stop()
     if running.timer is not None:
         bpy.context.window_manager.event_timer_remove(running.timer)
         running.timer = None
@@ -236,7 +235,7 @@ class SEIP_OT_stop(ShortWork, bpy.types.Operator):
     def act(self, _context: bpy.types.Context) -> None:
         """Ask the work to stop."""
         if session.running is not None:
-            session.running.stop = True
+            session.running.stop()
 
 
 class SEIP_OT_accept(ShortWork, bpy.types.Operator):
@@ -262,7 +261,7 @@ def forget() -> None:
     """Stop running work: when the add-on is disabled Blender drops its modal operators without calling `cancel`."""
     if (running := session.running) is not None:
         _stop(running)
-        running.work.join(JOIN_TIMEOUT)
+        running.join(JOIN_TIMEOUT)
 
 
 class ForPlacement(ForReadyScene):

@@ -16,7 +16,7 @@ from seip_addon.core.workflows.detection import DetectingPython
 from seip_addon.panel import detection as panel
 from seip_addon.panel import preferences
 from seip_addon.panel.detection import SEIP_OT_detect
-from seip_addon.panel.session import Background
+from seip_addon.panel.session import RunningWork
 from seip_addon.scene.write import write_result
 from tests.builders.small_junction import make_example
 
@@ -179,7 +179,7 @@ def test_work_that_is_stopped_ends_the_command_and_leaves_nothing(placed, stand_
     package = stand_in(
         end="sys.stderr.write('detect in run-1: 25% done, 6 s left\\n'); sys.stderr.flush(); time.sleep(99)"
     )
-    work = Background(next(SEIP_OT_detect.job(None, placed)))
+    work = RunningWork("", next(SEIP_OT_detect.job(None, placed)))
     end = time.monotonic() + 30
     while (work.progress.done, work.progress.total) != (25, 100) and time.monotonic() < end:
         time.sleep(0.05)

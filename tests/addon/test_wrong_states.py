@@ -15,7 +15,7 @@ from seip_addon.core.output.results.placement_record import parsed_record
 from seip_addon.panel import placement as placement_panel
 from seip_addon.panel import preferences, scene_status, work
 from seip_addon.panel.layout import draw_run
-from seip_addon.panel.session import Background, RunningWork, session
+from seip_addon.panel.session import RunningWork, session
 from tests.builders.drawn_layout import DrawnLayout
 
 
@@ -90,12 +90,12 @@ def endless():
 
 
 def test_work_under_way_ends_with_the_add_on(add_on):
-    running = session.running = RunningWork("seip.check_site", Background(endless()))
+    running = session.running = RunningWork("seip.check_site", endless())
     running.timer = bpy.context.window_manager.event_timer_add(1.0, window=bpy.context.window)
     work.forget()
     assert session.running is None
     assert running.timer is None
-    assert running.work.join(5.0)
+    assert running.join(5.0)
 
 
 def test_the_best_so_far_can_be_used_while_a_search_runs_and_only_then(placed, monkeypatch):
