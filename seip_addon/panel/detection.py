@@ -21,7 +21,7 @@ from ..scene.blend_file import save_blend
 from ..scene.sensors import labelled_sensors, pose_of
 from . import preferences, scene_status
 from .layout import BOX, Status, draw_path, draw_reason, draw_run, draw_runs, draw_sentence
-from .properties import absolute, path_property, runs_folder, saved_path
+from .properties import absolute, complaint, path_property, runs_folder, saved_path
 from .scene_status import no_sensors
 from .work import Job, LongWork, started
 
@@ -93,8 +93,7 @@ class SEIP_OT_detect(LongWork, bpy.types.Operator):
         scene, result = yield started(_detected(job, folder))
         scene.seip.detection.record, scene.seip.detection.sensors = result, sensors
         found = parsed_detection(result)
-        for sentence in found.warnings:
-            self.report({"WARNING"}, sentence)
+        self.warn(found.warnings)
         precision = found.average_precision[MAIN_RULE]
         self.report({"INFO"}, f"average precision {precision.average_precision:.1%}; written to {folder}")
 
@@ -142,12 +141,9 @@ def folder_of_result(folder: Path) -> Iterator[None]:
 def status(scene: bpy.types.Scene) -> Status:
     """Return the average precision for the header, and whether the sensors have changed since."""
     detection = scene.seip.detection
-    try:
-        found = parsed_detection(detection.record) if detection.record else None
-    except SeipError:
-        found = None
-    if found is None:
+    if not detection.record or complaint(lambda: parsed_detection(detection.record)):
         return Status()
+    found = parsed_detection(detection.record)
     return Status(sensors_key(scene) != detection.sensors, (f"AP {figures(found)[1][1].partition(' ')[0]}",))
 
 
@@ -171,11 +167,10 @@ def draw(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
 def _draw_found(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
     """Draw the figures while they belong to the present sensors, and the folder of the files."""
     detection, box = scene.seip.detection, layout.box()
-    try:
-        found = parsed_detection(detection.record)
-    except SeipError as error:
-        draw_sentence(box, str(error), icon="ERROR", reserved=BOX)
+    if wrong := complaint(lambda: parsed_detection(detection.record)):
+        draw_sentence(box, wrong, icon="ERROR", reserved=BOX)
         return
+    found = parsed_detection(detection.record)
     column = box.column()
     if status(scene).changed:
         draw_sentence(column, OTHER_SENSORS, icon="ERROR", reserved=BOX)

@@ -29,8 +29,6 @@ ICON = 18.0
 """Width that an icon before a text takes from it, pixels at the usual scale."""
 DEFAULT_WIDTH = 250.0
 """Width of the sidebar where there is no region, pixels at the usual scale."""
-FIELD = 34.0
-"""Width that the margins of a field and its button for files take, pixels at the interface's usual scale."""
 NARROW = 250
 """Pixels at the interface's usual scale."""
 UNIT = 20.0
@@ -233,15 +231,12 @@ def draw_path(
     *,
     named: bool = True,
 ) -> None:
-    """Draw a file or folder over the whole width, and below the field again if it has no room there."""
+    """Draw a file or folder over the whole width."""
     column = layout.column(align=True)
     column.use_property_split = False
     if named:
         column.label(text=owner.bl_rna.properties[name].name)
     column.prop(owner, name, text="", placeholder=placeholder)
-    path = getattr(owner, name)
-    if text_width(path) > sidebar_width() - MARGIN - FIELD:
-        draw_sentence(column, path)
 
 
 def draw_runs(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:

@@ -8,10 +8,10 @@ from bpy.props import EnumProperty, FloatProperty
 from ..core.site.roles import Role
 from ..core.site.scene_geometry import DEFAULT_WEIGHT
 from ..scene import contract, roles
-from . import scene_status, work
+from . import scene_status
 from .layout import draw_reason, draw_sentence, settings_column
 from .properties import as_typed
-from .work import Conditional, Obstacles, ShortWork
+from .work import Conditional, Obstacles, ShortWork, select_alone
 
 ROLE_ITEMS = tuple((role.name, role.value.capitalize(), f"{roles.WORDS[role].capitalize()}") for role in roles.ROLES)
 _POLE_RULES = ("", contract.MANDATORY, contract.FORBIDDEN)
@@ -140,7 +140,7 @@ class SEIP_OT_add_area(InObjectMode, ShortWork, bpy.types.Operator):
         """Add it, selected and active."""
         middle = tuple(context.scene.cursor.location)
         obj = roles.add_area(context.scene, Role[self.role], middle, tuple(self.size), self.turn, self.corners)
-        work.select_alone(context, obj)
+        select_alone(context, obj)
 
 
 def draw_roles(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:

@@ -103,8 +103,7 @@ class SEIP_OT_scan_frame(LongWork, bpy.types.Operator):
         scene, result = yield _scanned(_run_of(scene), now, session.of(scene).scan)
         session.of(scene).scan = result
         _show_cloud(scene)
-        for sentence in result.simulation.warnings:
-            self.report({"WARNING"}, sentence)
+        self.warn(result.simulation.warnings)
         self.report({"INFO"}, f"{counted(len(result.frame), 'point')} in {1e3 * result.seconds:.0f} ms")
 
 
@@ -133,8 +132,7 @@ class SEIP_OT_write_dataset(LongWork, bpy.types.Operator):
         """Record the scene as it is, and say what was written."""
         folder = saved_path(scene.seip.traffic.folder, "the scans")
         scene, (written, warnings) = yield _recorded(_run_of(scene), scene.seip.traffic.recording(), folder)
-        for sentence in warnings:
-            self.report({"WARNING"}, sentence)
+        self.warn(warnings)
         self.report({"INFO"}, f"{counted(len(written['frames']), 'frame')} in {folder}")
 
 

@@ -35,7 +35,7 @@ GENERIC = "generic"
 TABLE_WIDTH, TABLE_MARGIN = 760, 40
 """Width of the table, and of the window beside it, pixels at the usual scale of the interface."""
 COLUMNS = (("Sensor", 0.40), ("Channels", 0.11), ("Field of view", 0.14), ("Pedestrian", 0.12), ("Price", 0.11))
-"""Titles and shares of the width; the rest shows what the detection law rests on."""
+"""Titles and shares of the width; the rest shows what the detection law rests on; *Pedestrian* is the range to one."""
 BEAMS = "beams"
 DENSE, WIDE, CONE = (*rgb(DENSE_BEAMS), 0.9), (*rgb(WIDE_BEAMS), 0.9), (*rgb(PAPER), 0.35)
 """Colours of rings within 2δ of the next, of others, and of the edges of the field of view."""
@@ -164,7 +164,15 @@ class SEIP_OT_choose_sensors(bpy.types.Operator):
         """Draw the filter, and a row for each product."""
         survey, layout = context.scene.seip.survey, self.layout
         layout.prop(survey, "filter", text="", icon="VIEWZOOM", placeholder="Manufacturer or product")
-        draw_table(layout, survey)
+        wanted, models = survey.filter.casefold(), session.sensor_types
+        shown = [key for key in in_order() if wanted in f"{key} {title(models[key])}".casefold()]
+        _row(layout, None, (*(name for name, _ in COLUMNS), "Detection law"))
+        column = layout.column(align=True)
+        column.scale_y = 0.85
+        for key in shown:
+            _row(column, survey.types.get(key), _cells(models[key]))
+        if not shown:
+            column.label(text="No product has this in its name.", icon="INFO")
         layout.operator("seip.add_catalogue", icon="ADD")
 
 
@@ -181,34 +189,17 @@ def _row(layout: bpy.types.UILayout, item: bpy.types.PropertyGroup | None, cells
             rest.label(text=text, translate=False)
 
 
-def _title_of(key: str) -> str:
-    return title(session.sensor_types[key])
-
-
 def _cells(model: LidarModel) -> tuple[str, ...]:
     low, high = math.degrees(model.elevations.min()), math.degrees(model.elevations.max())
-    across = math.degrees(model.field_of_view)
+    law = "calibrated" if model.calibration else "data sheet"
     return (
         title(model),
         "rosette" if model.rosette is not None else f"{model.channels}",
-        f"{across:.0f}° × {high - low:.0f}°",
-        f"{pedestrian_range(model):.0f} m",
+        f"{math.degrees(model.field_of_view):.0f}° × {high - low:.0f}°",
+        f"{upright_range(model, PANELS['pedestrian'].reflected, VisibilitySettings()):.0f} m",
         f"${model.price:,.0f}",
-        _law(model),
+        "paper's model" if model.manufacturer == GENERIC else law,
     )
-
-
-def _law(model: LidarModel) -> str:
-    if model.manufacturer == GENERIC:
-        return "paper's model"
-    if model.calibration:
-        return "calibrated"
-    return "data sheet"
-
-
-def pedestrian_range(model: LidarModel) -> float:
-    """Return the distance in metres up to which a return from a pedestrian is detected with the usual probability."""
-    return upright_range(model, PANELS["pedestrian"].reflected, VisibilitySettings())
 
 
 def status(scene: bpy.types.Scene) -> Status:
@@ -236,20 +227,6 @@ def _names(keys: list[str]) -> str:
 def _span(heights: list[float]) -> str:
     low, high = min(heights), max(heights)
     return f"{low:g} m" if low == high else f"{low:g}–{high:g} m"
-
-
-def _on_road(model: LidarModel, heights: list[float], delta: float) -> list[tuple[str, str]]:
-    """Return the range on the road, and where the rings of the beams begin to leave gaps, for the greatest height."""
-    if not heights:
-        return []
-    height = max(heights)
-    far = road_range(model, REFLECTIVITY["asphalt"], height, VisibilitySettings())
-    across = math.sqrt(max(model.max_range**2 - height**2, 0.0))
-    dense = unresolved_from(model, height, delta, across)
-    lines = [("Height", f"{height:g} m"), ("On dry asphalt", f"up to {far:.0f} m")]
-    if dense < across:
-        lines.append(("Rings close", f"up to {dense:.0f} m, then gaps"))
-    return lines
 
 
 def _preview() -> Preview | None:
@@ -325,19 +302,6 @@ class SEIP_OT_preview_beams(ShortWork, bpy.types.Operator):
             overlays.show(context.scene, BEAMS, beam_overlay())
 
 
-def draw_table(layout: bpy.types.UILayout, survey: bpy.types.PropertyGroup) -> None:
-    """Draw the titles, and a row for each product whose name contains the filter."""
-    wanted = survey.filter.casefold()
-    shown = [key for key in in_order() if wanted in f"{key} {_title_of(key)}".casefold()]
-    _row(layout, None, (*(title for title, _ in COLUMNS), "Detection law"))
-    column = layout.column(align=True)
-    column.scale_y = 0.85
-    for key in shown:
-        _row(column, survey.types.get(key), _cells(session.sensor_types[key]))
-    if not shown:
-        column.label(text="No product has this in its name.", icon="INFO")
-
-
 def draw(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     """Draw the chosen products, and the heights and tilts at which they may be mounted."""
     survey = context.scene.seip.survey
@@ -391,11 +355,10 @@ def _draw_about(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
         draw_sentence(layout, "Choose a sensor that is in the catalogue.", icon="INFO")
         return
     layout.label(text=title(model), translate=False)
-    for what, value in _on_road(model, survey.parsed_heights(), survey.delta):
-        split = layout.split(factor=0.42)
-        split.scale_y = 0.8
-        split.label(text=what)
-        split.label(text=value)
+    if heights := survey.parsed_heights():
+        height = max(heights)
+        far = road_range(model, REFLECTIVITY["asphalt"], height, VisibilitySettings())
+        draw_sentence(layout, f"On dry asphalt, {height:g} m up: to {far:.0f} m")
     draw_sentence(layout, f"Detection: {model.evidence}")
     draw_sentence(layout, f"Figures: {model.source}")
     if model.assumed:

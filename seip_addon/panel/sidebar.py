@@ -8,8 +8,10 @@ import bpy
 from bpy.props import BoolProperty, CollectionProperty, IntProperty, PointerProperty
 
 from . import (
+    coverage,
     detection,
     export,
+    objective,
     placement,
     results,
     scans,
@@ -17,19 +19,11 @@ from . import (
     sensors,
     site,
     site_check,
+    survey,
     traffic,
     verification,
 )
-from .coverage import SEIP_PG_view
-from .detection import SEIP_PG_detection
 from .layout import Sidebar, Status, draw_sections
-from .objective import SEIP_PG_goal
-from .results import SEIP_PG_placement, SEIP_PG_result
-from .scene_status import FILE_VERSION
-from .site import EXTRACTS, SEIP_PG_site
-from .survey import SEIP_PG_survey
-from .traffic import SEIP_PG_simulation, SEIP_PG_traffic
-from .verification import SEIP_PG_verification
 
 STEPS: tuple[tuple[str, ...], ...] = (
     ("load_example", "download_map", "choose_map", "build_site", "check_site"),
@@ -90,18 +84,18 @@ def forget() -> None:
 class SEIP_PG_scene(bpy.types.PropertyGroup):
     """All that SEIP keeps with a scene."""
 
-    version: IntProperty(name="Version", default=FILE_VERSION, options={"HIDDEN"})
-    site: PointerProperty(type=SEIP_PG_site)
-    survey: PointerProperty(type=SEIP_PG_survey)
-    goal: PointerProperty(type=SEIP_PG_goal)
-    result: PointerProperty(type=SEIP_PG_result)
-    kept: CollectionProperty(type=SEIP_PG_placement)
+    version: IntProperty(name="Version", default=scene_status.FILE_VERSION, options={"HIDDEN"})
+    site: PointerProperty(type=site.SEIP_PG_site)
+    survey: PointerProperty(type=survey.SEIP_PG_survey)
+    goal: PointerProperty(type=objective.SEIP_PG_goal)
+    result: PointerProperty(type=results.SEIP_PG_result)
+    kept: CollectionProperty(type=results.SEIP_PG_placement)
     active_kept: IntProperty(name="Kept Placement", description="Placement to compare the present one with")
-    view: PointerProperty(type=SEIP_PG_view)
-    traffic: PointerProperty(type=SEIP_PG_traffic)
-    simulation: PointerProperty(type=SEIP_PG_simulation)
-    detection: PointerProperty(type=SEIP_PG_detection)
-    verification: PointerProperty(type=SEIP_PG_verification)
+    view: PointerProperty(type=coverage.SEIP_PG_view)
+    traffic: PointerProperty(type=traffic.SEIP_PG_traffic)
+    simulation: PointerProperty(type=traffic.SEIP_PG_simulation)
+    detection: PointerProperty(type=detection.SEIP_PG_detection)
+    verification: PointerProperty(type=verification.SEIP_PG_verification)
 
 
 class SEIP_PT_steps(Sidebar, bpy.types.Panel):
@@ -174,7 +168,7 @@ class SEIP_MT_main(bpy.types.Menu):
 
 def draw_import(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
     """Draw what File ▸ Import gets."""
-    for text, pattern in (("OpenDRIVE (.xodr)", "*.xodr"), ("OpenStreetMap (.osm)", EXTRACTS)):
+    for text, pattern in (("OpenDRIVE (.xodr)", "*.xodr"), ("OpenStreetMap (.osm)", site.EXTRACTS)):
         menu.layout.operator("seip.choose_map", text=text).filter_glob = pattern
 
 

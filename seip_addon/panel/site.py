@@ -40,8 +40,6 @@ from .work import Job, LongWork, Outcome
 
 _FILE = {"subtype": "FILE_PATH", "options": {"PATH_SUPPORTS_BLEND_RELATIVE"}}
 _CODE = {"min": 0, "max": 999_999}
-EXAMPLE = Path(__file__).resolve().parents[2] / "scenes" / f"junction{DESCRIPTION_SUFFIX}"
-"""The site that comes with SEIP: beside the package, in a checkout as in the extension."""
 EXTRACTS = "*.osm;*.osm.gz;*.osm.pbf"
 """Files of OpenStreetMap, as the file browser filters them."""
 NO_NEW_SITE = "Paste latitude and longitude, or a link of a web map, into New Site"
@@ -261,8 +259,7 @@ class _BuildsSite(WritesScene, LongWork):
         _bring_to_front(built)
         for note in result.model.notes:
             report({"INFO"}, note)
-        for warning in result.model.warnings:
-            report({"WARNING"}, warning)
+        self.warn(result.model.warnings)
         report({"INFO"}, f"{counted(len(result.model.parts), 'object')}, region {result.model.region.area:,.0f} m²")
         if bpy.context.window is not None and not bpy.app.background:
             bpy.ops.seip.check_site("INVOKE_DEFAULT")
@@ -301,7 +298,7 @@ class SEIP_OT_load_example(_BuildsSite, bpy.types.Operator):
 
     def job(self, _scene: bpy.types.Scene) -> Job:
         """Build the example, whose description says all."""
-        self._build(*(yield build_site(EXAMPLE, SiteRequest())))
+        self._build(*(yield build_site(traffic.EXAMPLE_SITE, SiteRequest())))
 
 
 def _copy_choice(chosen: SEIP_PG_site, site: SEIP_PG_site) -> None:

@@ -18,14 +18,12 @@ from ..core.workflows.survey import lay_out
 from ..core.workflows.survey_settings import SurveySettings
 from ..scene.changes import watch
 from ..scene.check import contents_of
-from . import scene_status, work
+from . import scene_status
 from .layout import Status, draw_reason, draw_run, draw_sentence
 from .object_roles import InObjectMode
 from .session import CheckedScene, session
-from .work import Job, LongWork, ShortWork
+from .work import Job, LongWork, ShortWork, select_alone
 
-TARGETS = "Targets"
-"""Count of the check that the header shows."""
 SHOW_WIDTH = 28.0
 """Width of the button next to a problem, pixels at the usual scale of the interface."""
 
@@ -79,7 +77,7 @@ class SEIP_OT_show_problem(InObjectMode, ShortWork, bpy.types.Operator):
             raise SeipError(f"the object {self.object!r} is not in this view layer")
         if not obj.visible_get():
             raise SeipError(f"the object {self.object!r} is hidden: show it first")
-        work.select_alone(context, obj)
+        select_alone(context, obj)
         if context.area is not None and context.area.type == "VIEW_3D":
             region = next(region for region in context.area.regions if region.type == "WINDOW")
             with context.temp_override(region=region):
@@ -93,7 +91,7 @@ def status(scene: bpy.types.Scene) -> Status:
     check = session.of(scene).check
     if check is None:
         return Status(result=("not checked", scene.name))
-    targets = (f"{value.partition(', ')[0]} points" for what, value in check.found.counts.items() if what == TARGETS)
+    targets = [f"{check.found.counts['Targets'].partition(', ')[0]} points"] if "Targets" in check.found.counts else []
     changed = scene_status.stale_check(scene) not in {"", scene_status.OTHER_SENSORS}
     return Status(changed, (in_short(check.found.problems), *targets, scene.name))
 

@@ -36,11 +36,10 @@ EXAMPLE = "Example"
 EXAMPLES = Path(__file__).resolve().parents[2] / "scenes"
 """Folder of the example: beside the package, in a checkout as in the extension."""
 EXAMPLE_RUN, EXAMPLE_MAP = EXAMPLES / "junction_traffic" / "run-1.npz", EXAMPLES / "junction.xodr"
+EXAMPLE_SITE = EXAMPLES / "junction.toml"
 NO_FILE = "There is no traffic file: name one, or animate objects of your own in SEIP Traffic."
 _MOST_SECONDS = 3600.0
 NO_MAP = "There is no map to simulate traffic on: name the OpenDRIVE map (.xodr) that this site was built from."
-_TEXT_MAP = "streets.net.xml"
-"""Name for the map of a text whose own name is no name of a file."""
 USED = "Detection and placements in traffic use these runs."
 OTHER_SETTINGS = "The settings have changed since: simulate again."
 
@@ -145,8 +144,7 @@ class SEIP_OT_load_traffic(LongWork, bpy.types.Operator):
         """Read the traffic onto the scene, and animate its road users."""
         scene, result = yield load_traffic(scene.seip.traffic.files(), read_scene(scene).geometry)
         show_traffic(scene, result.trajectories, result.warnings)
-        for sentence in result.warnings:
-            self.report({"WARNING"}, sentence)
+        self.warn(result.warnings)
         self.report({"INFO"}, f"{counted(len(result.trajectories), 'road user')}; press play")
 
 
@@ -265,15 +263,14 @@ class SEIP_OT_simulate_traffic(LongWork, bpy.types.Operator):
         seip.traffic.runs = named
         seip.simulation.facts, seip.simulation.made_with = result.summary, key
         show_traffic(scene, result.first, result.warnings[0])
-        for sentence in result.messages:
-            self.report({"WARNING"}, sentence)
+        self.warn(result.messages)
         self.report({"INFO"}, f"{result.summary}; press play")
 
 
 def _simulated_on_text(name: str, text: str, *more: Any) -> Generator[Progress, None, SimulatedRuns]:  # noqa: ANN401  # of `simulate_runs`
     """Simulate traffic on a map that is a text in the open file."""
     with TemporaryDirectory() as folder:
-        path = Path(folder) / (Path(name).name or _TEXT_MAP)
+        path = Path(folder) / Path(name).name
         path.write_text(text, encoding="utf-8")
         return (yield from simulate_runs(path, *more))
 

@@ -111,8 +111,7 @@ class SEIP_OT_verify(LongWork, bpy.types.Operator):
                 temporary.write_bytes(content)
         scene.seip.verification.found = "\n".join(summary(record_of(scene.name, "", found)))
         session.of(scene).verification = (found, watching)
-        for sentence in found.warnings:
-            self.report({"WARNING"}, sentence)
+        self.warn(found.warnings)
         self.report({"INFO"}, f"verified; written to {folder}")
 
 
@@ -152,8 +151,7 @@ class SEIP_OT_correct_scene(ShortWork, bpy.types.Operator):
         found, changes = last
         problems = correct_scene(scene, found)
         changes.look(scene)  # so that nothing is added twice
-        for sentence in problems:
-            self.report({"WARNING"}, sentence)
+        self.warn(problems)
         self.report({"INFO"}, "the scene is as recorded; its placement is stale")
 
 

@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Iterable
 from contextlib import suppress
 from typing import Any, TypeVar
 
@@ -86,6 +86,11 @@ class Conditional:
     def why_not(cls, context: bpy.types.Context) -> str:
         """Return the first reason why the operator is disabled, as a sentence; empty if it is enabled."""
         return next(filter(None, (obstacle(context.scene) for obstacle in cls.obstacles)), "")
+
+    def warn(self, sentences: Iterable[str]) -> None:
+        """Report warnings."""
+        for sentence in sentences:
+            self.report({"WARNING"}, sentence)  # type: ignore[attr-defined]  # of Blender's operators
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
