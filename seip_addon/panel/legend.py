@@ -15,6 +15,11 @@ from gpu_extras.batch import batch_for_shader
 
 from ..core.output.pictures.labels import stack_upwards
 
+Colour = tuple[float, float, float, float]
+Box = tuple[float, float, float, float]
+"""Left, bottom, right and top, pixels."""
+Label = tuple[str, tuple[float, ...]]
+"""Words, and the place (3,) in metres above which they stand."""
 TEXT_SIZE, LINE, SWATCH, GAP, MARGIN = 12.0, 20.0, 22.0, 8.0, 14.0  # pixels at the interface's usual scale
 LEAST_SCALE = 0.6
 """Scale below which letters could not be read; a legend that has no room even so is cut."""
@@ -24,13 +29,6 @@ EDGE: Colour = (0.55, 0.58, 0.62, 1.0)
 FONT = 0
 RISE, PAD, TALL, LABEL_GAP = 16.0, 5.0, 18.0, 2.0
 """Pixels at the interface's usual scale: above the sensor, beside the letters, of the letters, between labels."""
-
-
-Colour = tuple[float, float, float, float]
-
-
-Label = tuple[str, tuple[float, ...]]
-"""Words, and the place (3,) in metres above which they stand."""
 
 
 @dataclass(frozen=True)
@@ -47,10 +45,6 @@ class Block:
 
     title: str
     entries: tuple[Entry, ...]
-
-
-Box = tuple[float, float, float, float]
-"""Left, bottom, right and top, pixels."""
 
 
 def free_frame(area: bpy.types.Area, region: bpy.types.Region) -> Box:

@@ -35,7 +35,7 @@ GENERIC = "generic"
 TABLE_WIDTH, TABLE_MARGIN = 760, 40
 """Width of the table, and of the window beside it, pixels at the usual scale of the interface."""
 COLUMNS = (("Sensor", 0.40), ("Channels", 0.11), ("Field of view", 0.14), ("Pedestrian", 0.12), ("Price", 0.11))
-"""Titles and shares of the width; the rest shows what the detection law rests on; *Pedestrian* is the range to one."""
+"""Titles and shares of the width, with the range on a pedestrian; the rest shows what the detection law rests on."""
 BEAMS = "beams"
 DENSE, WIDE, CONE = (*rgb(DENSE_BEAMS), 0.9), (*rgb(WIDE_BEAMS), 0.9), (*rgb(PAPER), 0.35)
 """Colours of rings within 2δ of the next, of others, and of the edges of the field of view."""

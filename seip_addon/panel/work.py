@@ -107,6 +107,12 @@ class ForReadyScene(Conditional):
     obstacles: Obstacles = (scene_status.obstacle,)
 
 
+class ForPlacement(ForReadyScene):
+    """Mixin that enables an operator only where the scene has a placement."""
+
+    obstacles: Obstacles = (*ForReadyScene.obstacles, no_placement)
+
+
 class ShortWork(Conditional):
     """Mixin for operators that are done at once: an error is reported to the user."""
 
@@ -267,12 +273,6 @@ def forget() -> None:
     if (running := session.running) is not None:
         _stop(running)
         running.join(JOIN_TIMEOUT)
-
-
-class ForPlacement(ForReadyScene):
-    """Mixin that enables an operator only where the scene has a placement."""
-
-    obstacles: Obstacles = (*ForReadyScene.obstacles, no_placement)
 
 
 def select_alone(context: bpy.types.Context, obj: bpy.types.Object) -> None:
