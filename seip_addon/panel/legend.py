@@ -84,11 +84,11 @@ def draw_legend(blocks: Sequence[Block], frame: Box, scale: float) -> Box:
         wide, tall = _size(blocks, scale)
     right, bottom = frame[2] - MARGIN * scale, frame[1] + MARGIN * scale
     left, top = right - wide, bottom + tall
-    _fill(left, bottom, wide, tall, (PAPER, PAPER))
+    fill(left, bottom, wide, tall, (PAPER, PAPER))
     x, y = left + GAP * scale, top - GAP * scale
     for block in blocks:
         y -= LINE * scale
-        _write(block.title, x, y, scale)
+        write(block.title, x, y, scale)
         for entry in block.entries:
             y -= LINE * scale
             _draw_entry(entry, x, y, scale)
@@ -109,22 +109,22 @@ def _width(block: Block) -> float:
 
 
 def _draw_entry(entry: Entry, x: float, y: float, scale: float) -> None:
-    _fill(x - scale, y + scale, (SWATCH + 2) * scale, 13 * scale, (EDGE, EDGE))
+    fill(x - scale, y + scale, (SWATCH + 2) * scale, 13 * scale, (EDGE, EDGE))
     ends = entry.colours if len(entry.colours) > 1 else entry.colours * 2
     part = SWATCH * scale / (len(ends) - 1)
     for number, pair in enumerate(pairwise(ends)):
-        _fill(x + number * part, y + 2 * scale, part, 11 * scale, pair)
-    _write(entry.words, x + (SWATCH + GAP) * scale, y, scale)
+        fill(x + number * part, y + 2 * scale, part, 11 * scale, pair)
+    write(entry.words, x + (SWATCH + GAP) * scale, y, scale)
 
 
-def _write(words: str, x: float, y: float, scale: float) -> None:
+def write(words: str, x: float, y: float, scale: float) -> None:
     """Write words from their lower left corner."""
     blf.position(FONT, x, y + 3 * scale, 0)
     blf.color(FONT, *INK)
     blf.draw(FONT, words)
 
 
-def _fill(x: float, y: float, width: float, height: float, colours: tuple[Colour, ...]) -> None:
+def fill(x: float, y: float, width: float, height: float, colours: tuple[Colour, ...]) -> None:
     """Fill a rectangle with a colour on the left that runs into one on the right."""
     left, right = colours
     shader = gpu.shader.from_builtin("SMOOTH_COLOR")
@@ -166,6 +166,6 @@ def draw_labels(
     others = np.array([(box[0], box[1], box[2] - box[0], box[3] - box[1]) for box in taken]).reshape(-1, 4)
     rises = stack_upwards(np.array(own).reshape(-1, 4), LABEL_GAP * scale, others).tolist()
     for (words, at), (left, bottom, wide, tall), rise in zip(shown, own, rises, strict=True):
-        _fill(at.x - scale / 2, at.y, scale, bottom + rise - at.y, (PAPER, PAPER))
-        _fill(left, bottom + rise, wide, tall, (PAPER, PAPER))
-        _write(words, left + PAD * scale, bottom + rise, scale)
+        fill(at.x - scale / 2, at.y, scale, bottom + rise - at.y, (PAPER, PAPER))
+        fill(left, bottom + rise, wide, tall, (PAPER, PAPER))
+        write(words, left + PAD * scale, bottom + rise, scale)

@@ -35,6 +35,7 @@ from ..core.sensing.scans.simulation import Simulation
 from ..core.sensing.visibility.visibility_model import VisibilityModel
 from ..core.site.check import SiteCheck
 from ..core.workflows.returns import SensorReturns
+from ..core.workflows.site_places import SitePlaces
 from ..core.workflows.survey import Layout, Survey
 from ..core.workflows.survey_settings import SurveySettings
 from ..scene.changes import Watch
@@ -270,6 +271,8 @@ class Session:
         There is one piece of work at a time.
     following : FollowedSensors or None
         One scene is followed at a time.
+    places : SitePlaces or None
+        Junctions of the file that was read last, to choose from.
     """
 
     scenes: dict[int, SceneMemory] = field(default_factory=dict)
@@ -277,6 +280,7 @@ class Session:
     catalogue_error: str = ""
     running: RunningWork[Any] | None = None
     following: FollowedSensors | None = None
+    places: SitePlaces | None = None
 
     def of(self, scene: bpy.types.Scene) -> SceneMemory:
         """Return what is known of a scene; work that has ended stores there what it has found, on the main thread."""
@@ -303,3 +307,4 @@ def scene_of(number: int) -> bpy.types.Scene:
 def forget() -> None:
     """Let go of what is known of the open file."""
     session.scenes.clear()
+    session.places = None

@@ -35,6 +35,7 @@ from .layout import (
 from .object_roles import ROLE_ITEMS, WritesScene, draw_roles
 from .preferences import overpass, sumo_folders
 from .properties import absolute, as_typed, complaint, of_setting, path_property
+from .session import session
 from .site_check import draw_check, draw_contents
 from .work import Job, LongWork, Outcome
 
@@ -180,11 +181,17 @@ class SEIP_OT_choose_map(WritesScene, LongWork, bpy.types.Operator):
         _list_places(site, self.filepath, found)
         self.report({"INFO"}, counted(len(site.junctions), "junction"))
         if self.by_hand and not bpy.app.background:
-            sections = bpy.context.window_manager.seip_sections
-            sections.site = sections.change_site = True
-            overlays.open_sidebar(bpy.context.window)
-            if len(found.places) == 1 and not site.is_described():
-                site.junction = found.places[0].name
+            self._ask(site, found)
+
+    def _ask(self, site: SEIP_PG_site, found: SitePlaces) -> None:
+        """Ask for the place in the sidebar; where a file has several junctions, on the map."""
+        sections = bpy.context.window_manager.seip_sections
+        sections.site = sections.change_site = True
+        overlays.open_sidebar(bpy.context.window)
+        if len(found.places) == 1 and not site.is_described():
+            site.junction = found.places[0].name
+        elif not site.is_described() and bpy.ops.seip.pick_junction.poll():
+            bpy.ops.seip.pick_junction("INVOKE_DEFAULT")
 
 
 def _list_places(site: SEIP_PG_site, source: str, places: SitePlaces) -> None:
@@ -200,6 +207,7 @@ def _list_places(site: SEIP_PG_site, source: str, places: SitePlaces) -> None:
         one = site.junctions.add()
         one.name, one.id = place.name, place.key
     site.junction = before if before in site.junctions else ""
+    session.places = places
 
 
 class SEIP_OT_download_map(WritesScene, LongWork, bpy.types.Operator):
@@ -362,6 +370,8 @@ def _draw_map(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
     draw_run(layout, "seip.choose_map", icon="FILE_FOLDER", text=name or "Choose Map…")
     if not name:
         return
+    if len(site.junctions) > 1:
+        layout.operator("seip.choose_map", icon="VIEWZOOM", text="Pick on Map…").filepath = site.source
     if site.is_extract():
         preferences.draw_missing(layout)
     _draw_place(layout, site)

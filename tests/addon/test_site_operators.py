@@ -178,15 +178,3 @@ def test_the_check_lists_and_shows(junction):
     pole.hide_set(True)
     with pytest.raises(RuntimeError, match="is hidden"):
         bpy.ops.seip.show_problem(object=pole.name)
-
-
-def test_another_file_forgets_the_choice_and_the_same_one_keeps_it(scene):
-    site = scene.seip.site
-    bpy.ops.seip.choose_map(filepath=str(SCENES / "corridor.xodr"))
-    names = [one.name for one in site.junctions]
-    site.junction, site.radius = names[2], 55.0
-    bpy.ops.seip.choose_map(filepath=str(SCENES / "corridor.xodr"))
-    assert (site.junction, site.radius) == (names[2], 55.0)
-    bpy.ops.seip.choose_map(filepath=str(SCENES / "junction.xodr"))
-    assert (site.junction, site.radius) == ("", 80.0)
-    assert [one.name for one in site.junctions] != names

@@ -279,13 +279,16 @@ def _simulate(window: Window) -> Steps:
 
 
 def _import_map(window: Window) -> Steps:
-    """Import a map, as a dropped file is, through the sidebar, into a scene of its own."""
+    """Import a map, as a dropped file is, through its map and the sidebar, into a scene of its own."""
     before = set(bpy.data.scenes)
     with bpy.context.temp_override(window=window.window, area=window.area, region=window.region("WINDOW")):
         bpy.ops.seip.choose_map("INVOKE_DEFAULT", filepath=str(SCENES / "corridor.xodr"))
     yield from window.until(lambda: session.running is None and "corridor" in _scene().seip.site.source, 60)
     yield 1.0
-    yield from window.picture("12-place")
+    yield from window.shot("12-map")
+    yield from window.press("RET")  # from the map to the list of names
+    yield 1.0
+    yield from window.shot("12-place")
     yield from window.click("seip.build_site(")
     yield from window.until(lambda: session.running is None and set(bpy.data.scenes) - before, 120)
     yield from window.until(lambda: session.running is None and session.of(_scene()).check, 60)

@@ -11,6 +11,7 @@ from ..world.opendrive.read import read_map
 from ..world.openstreetmap.crossings import Crossing, named_crossings
 from ..world.openstreetmap.extract import read_extract
 from ..world.openstreetmap.site import is_extract
+from ..world.street_plan import StreetPlan, plan_of_extract, plan_of_map
 from ..world.streetscape.description import DEFAULT_RADIUS
 from ..world.streetscape.site_file import describe_place
 from ..world.streetscape.street_map import opendrive_streets
@@ -42,10 +43,13 @@ class SitePlaces:
         Default radius of a site.
     places : tuple of NamedPlace
         Junctions of the file.
+    plan : StreetPlan
+        Streets in plan, with the junctions in the order of ``places``.
     """
 
     radius: float
     places: tuple[NamedPlace, ...]
+    plan: StreetPlan
 
 
 def site_places(source: Path) -> Generator[Progress, None, SitePlaces]:
@@ -62,7 +66,7 @@ def site_places(source: Path) -> Generator[Progress, None, SitePlaces]:
         crossings = named_crossings(extract)
         named = distinct_names((one.name for one in crossings), "{} ({})")
         places = tuple(NamedPlace(name, _position(one)) for name, one in zip(named, crossings, strict=True))
-        return SitePlaces(DEFAULT_RADIUS, places)
+        return SitePlaces(DEFAULT_RADIUS, places, plan_of_extract(extract, crossings))
     map_path, description = describe_place(source)
     road_map = read_map(map_path)
     lanes = (yield from opendrive_streets(road_map)).lanes
@@ -74,7 +78,7 @@ def site_places(source: Path) -> Generator[Progress, None, SitePlaces]:
     places = tuple(
         NamedPlace(name, one.id) for name, one in zip(distinct_names(named, "{} ({})"), junctions, strict=True)
     )
-    return SitePlaces(description.radius or DEFAULT_RADIUS, places)
+    return SitePlaces(description.radius or DEFAULT_RADIUS, places, plan_of_map(road_map, lanes, junctions))
 
 
 def _position(crossing: Crossing) -> str:

@@ -37,6 +37,8 @@ REGION_VEIL, WEIGHTED_VEIL, FORBIDDEN_VEIL, MANDATORY_VEIL = "#d9d2ee", "#c04df0
 WEIGHT_COLOURS = ("#f1e6f7", "#d7b8e8", "#b584d3", "#8a4fb3", "#4f2374")
 """From the lightest weight to the heaviest, in the hue of weighted areas; lightness alone tells them apart."""
 
+MAP_GROUND, MAP_STREETS, MAP_JUNCTION = "#17191b", ("#53575b", "#83888d", "#b4b9be"), "#ffffff"
+"""The map on which a junction is chosen: streets by importance. Greys: nothing on it is coverage or a sensor."""
 PAPER_STREETS = ("#e3e7ea", "#cfd5d9", "#b7bfc5")
 """Streets on a map of sites, on paper, by importance."""
 SERIES_COLOURS = ("#d55e00", "#0072b2", "#009e73", "#cc79a7", "#56b4e9", "#e69f00")
