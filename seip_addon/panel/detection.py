@@ -1,4 +1,4 @@
-"""Detection: the sensors judged by what a trained detector finds with them in traffic."""
+"""Detection: evaluation of the sensors by what a trained detector finds with them in traffic."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What follows when a file is opened or saved, an edit is undone, or an object is deleted."""
+"""Handlers: work that follows when a file is opened or saved, an edit is undone, or an object is deleted."""
 
 from __future__ import annotations
 

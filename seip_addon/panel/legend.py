@@ -143,7 +143,7 @@ def draw_labels(
     Parameters
     ----------
     context : bpy.types.Context
-        Of the viewport that is drawn.
+        Context of the viewport that is drawn.
     frame : (left, bottom, right, top), pixels
         Part of the viewport that nothing covers; labels of what is in it are in its width.
     taken : sequence of Box

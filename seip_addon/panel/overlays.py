@@ -38,7 +38,7 @@ class Layer:
     colours : (n, 4) float32, or one colour for all
         sRGB and opacity; lines have one.
     size : float, pixels at the interface's usual scale
-        Of points, and the width of lines.
+        Size of points, and width of lines.
     """
 
     kind: Kind

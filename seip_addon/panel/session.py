@@ -247,7 +247,7 @@ class LastScan:
 
 @dataclass
 class SceneMemory:
-    """What is known of a scene: its state, check, last scan, and last verification with changes of the scene since."""
+    """Memory of a scene: its state, check, last scan, and last verification with changes of the scene since."""
 
     state: SceneState | None = None
     check: CheckedScene | None = None
