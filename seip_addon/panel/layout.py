@@ -21,6 +21,8 @@ from .work import Outcome, is_searching
 
 FONT = 0
 """Number of the font of the interface."""
+FIELD = 34.0
+"""Width of the frame of a field and of its button, pixels at the usual scale."""
 MARGIN = 62.0
 """Width of a panel's frame, of the tabs, of the scroll bar and before a text, pixels at the usual scale."""
 BOX = 22.0
@@ -231,12 +233,15 @@ def draw_path(
     *,
     named: bool = True,
 ) -> None:
-    """Draw a file or folder over the whole width."""
+    """Draw a file or folder over the whole width, and below the field again if it has no room there."""
     column = layout.column(align=True)
     column.use_property_split = False
     if named:
         column.label(text=owner.bl_rna.properties[name].name)
     column.prop(owner, name, text="", placeholder=placeholder)
+    path = getattr(owner, name)
+    if text_width(path) > sidebar_width() - MARGIN - FIELD:
+        draw_sentence(column, path)
 
 
 def draw_runs(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
