@@ -8,19 +8,11 @@ from typing import Any
 import bpy
 
 PARTS = (
-    "panels.preferences",
-    "properties.site", "properties.survey", "properties.placement",
-    "properties.traffic",
-    "properties.sections", "properties.scene",
-    "state.session", "operators.scene_survey", "state.sensor_types", "state.loose_pieces",
-    "viewport.overlays", "viewport.coverage",
-    "operators.base", "operators.site", "operators.street_map",
-    "operators.sensors", "operators.placement", "state.live_coverage",
-    "operators.results", "operators.view", "operators.traffic", "operators.detection",
-    "operators.verification",
-    "panels.sensors", "panels.site", "panels.placement", "panels.results", "panels.steps", "panels.front_door",
+    "session", "overlays", "work", "layout", "preferences", "survey", "sensors", "object_roles", "site_check",
+    "junction_map", "site", "objective", "traffic", "scans", "coverage", "following", "results", "export", "detection",
+    "verification", "placement", "sidebar", "events",
 )  # fmt: skip
-"""Modules of the add-on, whose classes are registered in the order of their definition.
+"""Modules of the panel, whose classes are registered in the order of their definition.
 
 Other registrations are in tables of the module: ``PROPERTIES`` (owner, name, property), ``HANDLERS`` (event, function),
 ``MENUS`` (menu, function), ``AT_START`` (functions to call once the open file can be read) and ``TIMERS`` (functions
@@ -31,12 +23,8 @@ _registered: list[ModuleType] = []
 
 
 def register() -> None:
-    """Register all parts, or say in the sidebar what they lack."""
-    try:
-        parts = [importlib.import_module(f".{name}", __package__) for name in PARTS]
-    except ImportError as error:
-        parts = [_incomplete(error)]
-    for part in parts:
+    """Register all parts."""
+    for part in [importlib.import_module(f".panel.{name}", __package__) for name in PARTS]:
         for one in _classes(part):
             bpy.utils.register_class(one)
         _registered.append(part)
@@ -101,10 +89,3 @@ def _forget(*_: object) -> None:
     for part in reversed(_registered):
         if hasattr(part, "forget"):
             part.forget()
-
-
-def _incomplete(error: ImportError) -> ModuleType:
-    """Return the part that stands in for all others where a package is missing or broken."""
-    part = importlib.import_module(".panels.missing_package", __package__)
-    part.MISSING = error.name or str(error)  # type: ignore[attr-defined]  # the panel's one fact
-    return part

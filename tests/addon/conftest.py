@@ -6,8 +6,7 @@ import bpy
 import pytest
 
 import seip_addon
-from seip_addon import preferences
-from seip_addon.state import sensor_types
+from seip_addon.panel import preferences, sensors
 
 
 @pytest.fixture
@@ -32,7 +31,7 @@ def junction(add_on, small_scene):
     scene.seip.survey.grid = 4.0
     scene.seip.survey.spacing = 12.0
     scene.seip.goal.count = 2
-    sensor_types.refresh()
+    sensors.refresh()
     for one in scene.seip.survey.types:
         one.use = one.name == "type1"
     return scene

@@ -15,14 +15,13 @@ from seip_addon.core.choosing.placement.objective import MOVED, MOVED_MESSAGE, O
 from seip_addon.core.output.pictures.colours import unpacked_counts
 from seip_addon.core.output.results.answer import status_text
 from seip_addon.core.output.results.placement_record import comparable, load_placement, parsed_record
-from seip_addon.panels import placement, results, sensors
+from seip_addon.panel import coverage, following, placement, results, scene_status, sensors
+from seip_addon.panel.scene_status import sensor_edits
+from seip_addon.panel.session import session
 from seip_addon.scene import result_folder
 from seip_addon.scene.blend_file import save_blend
 from seip_addon.scene.result_folder import FILES
 from seip_addon.scene.sensors import placed_sensors
-from seip_addon.state import live_coverage, scene_status
-from seip_addon.state.sensor_edits import sensor_edits
-from seip_addon.state.session import session
 from tests.builders.drawn_layout import DrawnLayout
 from tests.oracles.json_schema import violations
 
@@ -56,7 +55,7 @@ def full_scan(scene: bpy.types.Scene) -> np.ndarray:
     bpy.ops.seip.follow_sensors()
     seen = np.sum([row for _, row, _ in session.following.sensors.values()], axis=0)
     assert not sensor_edits(scene)
-    live_coverage.stop()
+    following.stop()
     return seen
 
 
@@ -105,7 +104,7 @@ def test_a_file_of_an_earlier_command_opens_with_its_sensors_which_are_evaluated
     assert scene_status.current_step(scene) == "placement"
     assert sensors.status(scene).result[0] == "Type 1 (16 channels)"
     bpy.context.window_manager.seip_sections.view = True
-    monkeypatch.setattr(results.coverage, "shows_coverage", lambda _: True)  # there is no 3D view
+    monkeypatch.setattr(coverage, "shows_coverage", lambda _: True)  # there is no 3D view
     layout = DrawnLayout()
     results.draw(layout, bpy.context)
     assert "seip.colour_coverage" in dict(layout.operators)
@@ -214,6 +213,6 @@ def test_an_export_that_fails_or_is_stopped_leaves_the_earlier_one_whole(placed,
         bpy.ops.seip.export_result()
     assert {path.name: path.read_bytes() for path in out.iterdir()} == before
     monkeypatch.undo()
-    monkeypatch.setattr("seip_addon.preferences.cache_folder", lambda: tmp_path / "cache")
+    monkeypatch.setattr("seip_addon.panel.preferences.cache_folder", lambda: tmp_path / "cache")
     bpy.ops.seip.export_result()
     assert (out / "placement.json").read_bytes() != before["placement.json"]

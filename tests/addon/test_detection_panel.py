@@ -12,12 +12,12 @@ from unittest.mock import MagicMock
 import bpy
 import pytest
 
-from seip_addon import preferences
 from seip_addon.core.workflows.detection import DetectingPython
-from seip_addon.operators.detection import SEIP_OT_detect
-from seip_addon.panels import traffic as traffic_panel
+from seip_addon.panel import detection as panel
+from seip_addon.panel import preferences
+from seip_addon.panel.detection import SEIP_OT_detect
+from seip_addon.panel.session import RunningWork
 from seip_addon.scene.write import write_result
-from seip_addon.state.background import Background
 from tests.builders.small_junction import make_example
 
 PRECISION = {
@@ -73,9 +73,9 @@ def drawn(monkeypatch):
     """Return the sentences, labels and operators of the panel."""
     said, layout = [], MagicMock()
     labels = layout.box().column().column().split().label
-    monkeypatch.setattr(traffic_panel, "draw_sentence", lambda _, text, **__: said.append(text))
-    monkeypatch.setattr(traffic_panel, "draw_reason", lambda _, text: bool(text) and not said.append(text))
-    traffic_panel.draw_detection(layout, bpy.context)
+    monkeypatch.setattr(panel, "draw_sentence", lambda _, text, **__: said.append(text))
+    monkeypatch.setattr(panel, "draw_reason", lambda _, text: bool(text) and not said.append(text))
+    panel.draw(layout, bpy.context)
     return said, [call.kwargs["text"] for call in labels.call_args_list]
 
 
@@ -107,7 +107,7 @@ def test_the_figures_stand_in_the_panel_and_the_files_in_the_folder(placed, stan
         "Cars, vans": "80.0%",
         "Pedestrians": "25.0%",
     }
-    assert said == [traffic_panel.MEANING, "it was trained on other types"]
+    assert said == [panel.MEANING, "it was trained on other types"]
 
 
 def test_the_command_is_given_what_the_panel_shows(placed, stand_in, small_scene, tmp_path):
@@ -127,11 +127,11 @@ def test_sensors_that_were_changed_make_the_figures_old(placed, stand_in, monkey
     bpy.ops.seip.detect()
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "kept.blend"))
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "kept.blend"))
-    assert traffic_panel.OTHER_SENSORS not in drawn(monkeypatch)[0]
+    assert panel.OTHER_SENSORS not in drawn(monkeypatch)[0]
     sensor = next(obj for obj in bpy.data.collections["SEIP Sensors"].objects if "seip_sensor" in obj)
     sensor.rotation_euler.z += 0.1
     bpy.context.view_layer.update()
-    assert traffic_panel.OTHER_SENSORS in drawn(monkeypatch)[0]
+    assert panel.OTHER_SENSORS in drawn(monkeypatch)[0]
 
 
 def no_sensors(scene, folder):
@@ -179,7 +179,7 @@ def test_work_that_is_stopped_ends_the_command_and_leaves_nothing(placed, stand_
     package = stand_in(
         end="sys.stderr.write('detect in run-1: 25% done, 6 s left\\n'); sys.stderr.flush(); time.sleep(99)"
     )
-    work = Background(next(SEIP_OT_detect.job(None, placed)))
+    work = RunningWork("", next(SEIP_OT_detect.job(None, placed)))
     end = time.monotonic() + 30
     while (work.progress.done, work.progress.total) != (25, 100) and time.monotonic() < end:
         time.sleep(0.05)

@@ -7,12 +7,11 @@ from types import SimpleNamespace
 import bpy
 import pytest
 
-from seip_addon import preferences
 from seip_addon.core.workflows.site_building import SiteRequest, site_source
-from seip_addon.panels import site as site_panel
+from seip_addon.panel import preferences, scene_status
+from seip_addon.panel import site as site_panel
+from seip_addon.panel.session import RunningWork
 from seip_addon.scene import contract
-from seip_addon.state import scene_status
-from seip_addon.state.background import Background
 from tests.builders.drawn_layout import DrawnLayout
 from tests.builders.osm_text import Extract, crossing
 from tests.builders.overpass_server import DATE, Answer, overpass_server, overpass_xml
@@ -80,7 +79,7 @@ def test_the_site_is_built_with_its_credit_and_a_larger_one_downloads_more(scene
 
 def test_a_stopped_download_ends_at_once_and_leaves_no_file(stand_in, tmp_path):
     stand_in.answers = [Answer(overpass_xml(crossing()), sent=400, held=threading.Event())]
-    work = Background(site_source(SiteRequest(near_latlon=(52.5, 13.4), overpass=preferences.overpass())))
+    work = RunningWork("", site_source(SiteRequest(near_latlon=(52.5, 13.4), overpass=preferences.overpass())))
     work.stop()
     assert work.join(2.0)
     with pytest.raises(CancelledError):

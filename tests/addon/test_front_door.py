@@ -11,14 +11,15 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from seip_addon.operators.base import LongWork
-from seip_addon.panels import export, front_door, results, sections, sidebar, traffic, wrapped_text
+
+from seip_addon.panel import coverage, detection, events, export, results, scene_status, sidebar
+from seip_addon.panel import layout as layout_parts
+from seip_addon.panel.work import LongWork
 from seip_addon.scene import contract
 from seip_addon.scene.read import read_scene
 from seip_addon.scene.sensors import placed_sensors
 from seip_addon.scene.views import CLIP_END
 from seip_addon.scene.write import write_result
-from seip_addon.state import loose_pieces, scene_status
 from tests.builders.drawn_layout import DrawnLayout
 from tests.builders.osm_text import crossing
 from tests.builders.scene_by_hand import make_scene
@@ -57,7 +58,7 @@ def drawn(draw):
 
 
 def test_import_is_in_the_file_menu_and_takes_dropped_files(scene):
-    assert drawn(front_door.draw_import) == ["seip.choose_map", "seip.choose_map"]
+    assert drawn(sidebar.draw_import) == ["seip.choose_map", "seip.choose_map"]
     handler = bpy.types.SEIP_FH_map
     assert (handler.bl_import_operator, handler.bl_file_extensions) == ("seip.choose_map", ".xodr;.osm;.gz")
     for kind, expected in (("VIEW_3D", True), ("TEXT_EDITOR", False)):
@@ -123,22 +124,22 @@ def test_the_post_of_a_deleted_sensor_goes_with_it(scene, copied):
             bpy.ops.object.duplicate()
         bpy.context.view_layer.update()
         (sensor,) = (obj for obj in scene.objects if obj.name not in before and obj.type == "EMPTY")
-        loose_pieces.remove()
+        events.remove_loose_pieces()
     else:
         before -= {sensor.name, *(child.name for child in sensor.children)}
     assert len(sensor.children) == 1
     with bpy.context.temp_override(selected_objects=[sensor]):
         bpy.ops.object.delete()
     bpy.context.view_layer.update()
-    assert bpy.app.timers.is_registered(loose_pieces.remove)
-    loose_pieces.remove()
+    assert bpy.app.timers.is_registered(events.remove_loose_pieces)
+    events.remove_loose_pieces()
     assert {obj.name for obj in scene.objects} == before
 
 
 def test_a_section_has_one_sentence_where_there_is_nothing_yet(scene, monkeypatch):
-    for draw in (results.draw, export.draw, results.draw_view, traffic.draw_detection):
+    for draw in (results.draw, export.draw, coverage.draw_view, detection.draw):
         said = []
-        for module in (sidebar, results, traffic):
+        for module in (layout_parts, coverage, detection):
             monkeypatch.setattr(module, "draw_sentence", lambda _, text, said=said, **__: said.append(text))
         layout = DrawnLayout()
         draw(layout, bpy.context)
@@ -148,18 +149,18 @@ def test_a_section_has_one_sentence_where_there_is_nothing_yet(scene, monkeypatc
 
 def headers(monkeypatch, width, status, *, running):
     """Return what the closed header of the placement shows in a sidebar of a width: texts and icons."""
-    monkeypatch.setattr(sections, "session", SimpleNamespace(running=running and SimpleNamespace(operator=running)))
+    monkeypatch.setattr(layout_parts, "session", SimpleNamespace(running=running and SimpleNamespace(operator=running)))
     region = SimpleNamespace(width=width)
     context = SimpleNamespace(region=region, **{n: getattr(bpy.context, n) for n in ("window_manager", "preferences")})
-    monkeypatch.setattr(sections, "bpy", SimpleNamespace(context=context))
+    monkeypatch.setattr(layout_parts, "bpy", SimpleNamespace(context=context))
     bpy.context.window_manager.seip_sections.placement = False
     layout = DrawnLayout()
-    sections.draw_sections(layout, {"placement": None}, None, {"placement": status})
+    layout_parts.draw_sections(layout, {"placement": None}, None, {"placement": status})
     return layout.labels[1:]
 
 
 def test_a_closed_header_shows_change_and_work_at_every_width_and_no_result_is_cut(scene, monkeypatch):
-    long = sections.Status(changed=True, result=("94%", "$48k", "within 12.3%"))
+    long = layout_parts.Status(changed=True, result=("94%", "$48k", "within 12.3%"))
     work = "seip.solve_placement"
     assert headers(monkeypatch, 500, long, running=work) == [("changed · working · 94% · $48k · within 12.3%", "NONE")]
     assert headers(monkeypatch, 320, long, running=work) == [("changed · working · 94%", "NONE")]
@@ -167,7 +168,7 @@ def test_a_closed_header_shows_change_and_work_at_every_width_and_no_result_is_c
     for width in range(120, 280, 10):
         shown = headers(monkeypatch, width, long, running=work)
         assert shown in ([("changed · working", "NONE")], [("", "ERROR"), ("", "TIME")])
-        free = sections.Status(result=("no room for a result as long as this one", "3"))
+        free = layout_parts.Status(result=("no room for a result as long as this one", "3"))
         assert headers(monkeypatch, width, free, running=None) in ([], [("3", "NONE")])
 
 
@@ -176,22 +177,23 @@ def test_the_header_of_some_section_shows_the_work_of_each_operator(scene):
         return {one for below in kind.__subclasses__() for one in (below, *kinds(below))}
 
     long = {kind.bl_idname.partition(".")[2] for kind in kinds(LongWork) if hasattr(kind, "bl_idname")}
-    assert set().union(*sections.WORK.values()) == long
+    assert set().union(*layout_parts.WORK.values()) == long
 
 
 @pytest.mark.parametrize("width", [90.0, 160.0, 420.0])
-def test_no_line_is_wider_than_its_room_and_no_letter_of_a_path_is_lost(scene, width):
+def test_no_line_is_wider_than_its_room_and_no_letter_of_a_path_is_lost(scene, width, monkeypatch):
     text = "written to /srv/somebody/a/very/long/path_that_has_no_blank/and-goes-on/result/placement.json at once"
-    lines = wrapped_text.wrapped(text, 30.0, width)
-    assert max(map(wrapped_text.text_width, lines)) <= width - 30.0
+    monkeypatch.setattr(layout_parts, "sidebar_width", lambda: width)
+    lines = layout_parts.wrapped(text, 30.0)
+    assert max(map(layout_parts.text_width, lines)) <= width - 30.0
     assert "".join(lines).replace(" ", "") == text.replace(" ", "")
 
 
 def test_all_sections_open_without_and_with_a_placement(junction, monkeypatch):
     for name in [one.identifier for one in bpy.context.window_manager.seip_sections.bl_rna.properties]:
-        if not name.endswith("_state") and name not in {"rna_type", "name"}:
+        if name not in {"rna_type", "name"}:
             setattr(bpy.context.window_manager.seip_sections, name, True)
-    monkeypatch.setattr(results.coverage, "shows_coverage", lambda _: True)  # there is no 3D view
+    monkeypatch.setattr(coverage, "shows_coverage", lambda _: True)  # there is no 3D view
     panel = SimpleNamespace(layout=DrawnLayout())
     bpy.types.SEIP_PT_steps.draw(panel, bpy.context)
     bpy.ops.seip.solve_placement()
@@ -202,7 +204,7 @@ def test_all_sections_open_without_and_with_a_placement(junction, monkeypatch):
     bpy.types.SEIP_PT_steps.draw(panel, bpy.context)
     drawn = {name for name, _ in panel.layout.operators}
     assert {"seip.check_site", "seip.choose_sensors", "seip.solve_placement"} <= drawn
-    assert {"seip.write_report", "seip.save_picture", "seip.show_comparison"} <= drawn
-    menu = {f"seip.{name}" for step in front_door.STEPS for name in step}
+    assert {"seip.write_report", "seip.export_result", "seip.show_comparison"} <= drawn
+    menu = {f"seip.{name}" for step in sidebar.STEPS for name in step}
     own = {name.partition(".")[2] for name in drawn | menu if name.startswith("seip.")}
     assert all(hasattr(bpy.types, f"SEIP_OT_{name}") for name in own)

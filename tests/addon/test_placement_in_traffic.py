@@ -12,8 +12,8 @@ import pytest
 
 from seip_addon.core.choosing.placement.scenarios import DEFAULT_COUNTS
 from seip_addon.core.output.results.placement_record import comparable, load_placement, parsed_record
-from seip_addon.operators.placement import SEIP_OT_solve_placement
-from seip_addon.state.session import session
+from seip_addon.panel.placement import SEIP_OT_solve_placement
+from seip_addon.panel.session import session
 from tests.builders.small_scene import make_run
 
 OPTIONS = [

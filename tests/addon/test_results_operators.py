@@ -7,12 +7,12 @@ import pytest
 from seip_addon.core.choosing.placement.returns_summary import returns_text
 from seip_addon.core.output.pictures.colours import unpacked_counts
 from seip_addon.core.output.results.placement_record import parsed_record
-from seip_addon.panels import results as results_panel
+from seip_addon.panel import following
+from seip_addon.panel import results as results_panel
+from seip_addon.panel.coverage import legend_of_coverage
+from seip_addon.panel.scene_status import sensor_edits
+from seip_addon.panel.session import session
 from seip_addon.scene.sensors import placed_sensors
-from seip_addon.state import live_coverage
-from seip_addon.state.sensor_edits import sensor_edits
-from seip_addon.state.session import session
-from seip_addon.viewport.coverage import legend_of_coverage
 from tests.builders.drawn_layout import DrawnLayout
 
 
@@ -59,28 +59,28 @@ def test_moved_sensors_are_followed(placed):
     assert bpy.ops.seip.follow_sensors() == {"FINISHED"}
     assert session.following.coverage == pytest.approx(coverage, abs=1e-9)
     assert (shown(placed) == before).all()
-    assert sensor_edits(placed).moved == ()
+    assert sensor_edits(placed) == ""
 
     first = placed_sensors(placed)["S1"]
     there = first.location.copy()
     first.location.z -= 4.0
     bpy.context.view_layer.update()
-    assert bpy.app.timers.is_registered(live_coverage.update)
-    live_coverage.update()
-    assert sensor_edits(placed).moved == ("S1",)
+    assert bpy.app.timers.is_registered(following.update)
+    following.update()
+    assert sensor_edits(placed) == "By hand: S1 moved."
     assert (shown(placed) != before).any()
     assert session.following.coverage == pytest.approx((shown(placed) > 0).mean())
 
     first.location = there
-    live_coverage.update()
-    assert sensor_edits(placed).moved == ()
+    following.update()
+    assert sensor_edits(placed) == ""
     assert (shown(placed) == before).mean() > 0.99  # the place is in single precision
 
     first.rotation_euler.x = 0.4  # tilted: every ray is cast
-    live_coverage.update()
-    assert sensor_edits(placed).moved == ("S1",)
+    following.update()
+    assert sensor_edits(placed) == "By hand: S1 moved."
     bpy.data.objects.remove(first)
-    live_coverage.update()
+    following.update()
     assert (shown(placed) <= 1).all()
 
 
@@ -96,7 +96,7 @@ def test_a_placement_for_returns_is_followed_and_compared_by_returns(junction):
     assert f"{returns_text(before)} returns" in layout.text
     bpy.ops.seip.keep_placement(name="all")
     placed_sensors(scene)["S1"].location.z += 500.0
-    live_coverage.update()
+    following.update()
     now = session.following.summary.typical
     assert now < before
     layout = DrawnLayout()

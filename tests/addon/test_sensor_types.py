@@ -3,10 +3,8 @@
 import bpy
 import pytest
 
-from seip_addon import preferences
-from seip_addon.core.sensing.lidar.catalogue import load_catalogue
 from seip_addon.core.site.candidates import DEFAULT_TYPE
-from seip_addon.panels import sensors
+from seip_addon.panel import preferences, sensors
 from tests.builders.drawn_layout import DrawnLayout
 
 OWN = """
@@ -81,26 +79,6 @@ def test_a_bad_catalogue_is_refused(survey, own, tmp_path):
     assert preferences.catalogue_files() == ()
 
 
-def test_a_preset_brings_types_heights_and_tilts_back(survey, tmp_path, monkeypatch):
-    folder = tmp_path / "presets" / "seip" / "survey"
-    monkeypatch.setattr(bpy.utils, "user_resource", lambda *_, path="", create=False: _made(tmp_path / path))
-    survey.heights, survey.grid, survey.types["vlp16"].use = "4 6", 2.5, True
-    survey.tilts = "0 10"
-    assert bpy.ops.seip.add_survey_preset(name="Two heights") == {"FINISHED"}
-    (file,) = folder.glob("*.py")
-    survey.heights, survey.grid, survey.types["vlp16"].use = "8", 1.0, False
-    survey.tilts = "0"
-    bpy.ops.script.execute_preset(filepath=str(file), menu_idname="SEIP_MT_survey_presets")
-    assert (survey.heights, survey.grid, survey.tilts) == ("4 6", 2.5, "0 10")
-    assert used(survey) == ("vlp16", DEFAULT_TYPE)
-    assert [one.name for one in survey.types] == list(load_catalogue())
-
-
-def _made(path):
-    path.mkdir(parents=True, exist_ok=True)
-    return str(path)
-
-
 def test_a_sensor_is_dropped_and_shown(survey):
     survey.types["vlp16"].use = True
     sections = bpy.context.window_manager.seip_sections
@@ -115,17 +93,3 @@ def test_a_sensor_is_dropped_and_shown(survey):
     sensors.draw(layout, bpy.context)
     assert layout.text.count("Velodyne VLP-16 (Puck)") == 2  # the product, and its figures
     assert sensors.status(bpy.context.scene).result == ("VLP-16 (Puck)", "at 3.5–8 m")
-
-
-def test_the_cache_is_emptied_of_grids_alone(survey):
-    folder = preferences.cache_folder()
-    with pytest.raises(RuntimeError, match="The cache is empty"):
-        bpy.ops.seip.empty_cache()
-    folder.mkdir(parents=True)
-    (folder / f"{'a' * 32}.npz").write_bytes(b"x" * 1000)
-    pieces = folder / f"{'b' * 32}.pieces"
-    pieces.mkdir()
-    (pieces / "1.npz").write_bytes(b"x" * 500)
-    (folder / "mine.txt").write_text("mine", encoding="utf-8")
-    assert bpy.ops.seip.empty_cache() == {"FINISHED"}
-    assert [entry.name for entry in folder.iterdir()] == ["mine.txt"]

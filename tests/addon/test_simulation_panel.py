@@ -9,8 +9,8 @@ from headless import traffic
 import bpy
 import pytest
 
-from seip_addon.operators.traffic import SEIP_OT_simulate_traffic
-from seip_addon.panels import traffic as traffic_panel
+from seip_addon.panel import traffic as panel
+from seip_addon.panel.traffic import SEIP_OT_simulate_traffic
 from tests.builders.drawn_layout import DrawnLayout
 from tests.builders.osm_text import crossing
 from tests.sumo_here import needs_sumo
@@ -35,7 +35,7 @@ def short(scene):
 
 def drawn():
     layout = DrawnLayout()
-    traffic_panel.draw_simulation(layout, bpy.context)
+    panel.draw_simulation(layout, bpy.context)
     return layout
 
 
@@ -51,10 +51,10 @@ def test_runs_are_those_of_the_command_and_used_by_the_next_buttons(site, tmp_pa
     assert bpy.ops.seip.load_traffic() == {"FINISHED"}
     text = drawn().text
     assert "2 runs, " in text
-    assert traffic_panel.USED in text
-    assert traffic_panel.OTHER_SETTINGS not in text
+    assert panel.USED in text
+    assert panel.OTHER_SETTINGS not in text
     seip.simulation.flow = 500.0
-    assert traffic_panel.OTHER_SETTINGS in drawn().text
+    assert panel.OTHER_SETTINGS in drawn().text
     traffic.main([
         str(SCENES / "junction.blend"), "--simulate", str(SCENES / "junction.xodr"), "--flow", "450",
         "--pedestrians", "60", "--duration", "5", "--seed", "2", "-o", str(tmp_path / "2.npz"),

@@ -12,10 +12,10 @@ from seip_addon.core.output.results.answer import sentence
 from seip_addon.core.site.installed_cost import load_installed_cost
 from seip_addon.core.site.obstruction import NO_OBSTACLES_MESSAGE
 from seip_addon.core.world.elevation.at_place import TerrainRequest
-from seip_addon.panels import placement
+from seip_addon.panel import placement
+from seip_addon.panel.session import session
 from seip_addon.scene import contract
 from seip_addon.scene.read import read_scene
-from seip_addon.state.session import session
 from tests.builders.drawn_layout import DrawnLayout
 
 SCENES = Path(__file__).resolve().parents[2] / "scenes"

@@ -5,10 +5,8 @@ from pathlib import Path
 import bpy
 import pytest
 
-from seip_addon.operators import scene_survey
-from seip_addon.panels import site
-from seip_addon.state import live_coverage, scene_status
-from seip_addon.state.session import SceneState, session
+from seip_addon.panel import events, following, scene_status, site_check
+from seip_addon.panel.session import SceneState, session
 
 
 @pytest.fixture
@@ -100,12 +98,12 @@ def test_undo_of_a_change_leaves_no_trace(known, change):
     bpy.context.view_layer.update()
     bpy.ops.ed.undo_push(message="after")
     assert all(state(scene) for state in states)
-    live_coverage.update()
+    following.update()
     assert session.following.problem
     sections.details = True
     sections.site = False
     bpy.ops.ed.undo()
-    for again in (scene_survey.look_again, live_coverage.update):
+    for again in (events.look_again, following.update):
         assert bpy.app.timers.is_registered(again)
         again()
     assert [state(bpy.context.scene) for state in states] == ["", ""]
@@ -121,7 +119,7 @@ def test_following_ends_without_an_error_where_undo_brings_back_another_placemen
     bpy.ops.ed.undo_push(message="one sensor")
     bpy.ops.seip.follow_sensors()
     bpy.ops.ed.undo()
-    live_coverage.update()
+    following.update()
     assert session.following is None
 
 
@@ -173,13 +171,13 @@ def test_a_check_holds_until_scene_or_settings_change(known, tmp_path):
     assert scene_status.stale_check(scene) == ""
     scene.seip.survey.heights = "5 8"
     assert scene_status.stale_check(scene) == scene_status.OTHER_SENSORS
-    assert not site.status(scene).changed
+    assert not site_check.status(scene).changed
     scene.seip.survey.spacing = 7.0
     assert scene_status.stale_check(scene) == "The settings have changed since the check."
-    assert site.status(scene).changed
+    assert site_check.status(scene).changed
     bpy.ops.seip.check_site()
     move()
     bpy.context.view_layer.update()
     assert scene_status.stale_check(scene) == "The scene has changed since the check."
     bpy.ops.seip.check_site()
-    assert site.status(reopened(tmp_path)).result[0] == "not checked"
+    assert site_check.status(reopened(tmp_path)).result[0] == "not checked"

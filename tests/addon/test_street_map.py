@@ -8,8 +8,8 @@ import pytest
 
 from seip_addon.core.base.progress import finish
 from seip_addon.core.workflows.site_places import site_places
-from seip_addon.state.session import session
-from seip_addon.viewport.street_map import StreetMap
+from seip_addon.panel.junction_map import StreetMap
+from seip_addon.panel.session import session
 from tests.builders.osm_text import Extract, crossing
 
 SCENES = Path(__file__).resolve().parents[2] / "scenes"

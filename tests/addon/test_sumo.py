@@ -1,15 +1,13 @@
-"""Where SUMO is missing, panel, dialog and preferences say so and install it."""
+"""Where SUMO is missing, panel and preferences say so and install it."""
 
 import sys
-from types import SimpleNamespace
 
 import bpy
 import pytest
 
-from seip_addon import preferences
 from seip_addon.core.programs import sumo_programs
 from seip_addon.core.programs.sumo_installation import SUMO_VERSION, sumo_size
-from seip_addon.panels import site, sumo
+from seip_addon.panel import preferences, site
 from tests.builders.drawn_layout import DrawnLayout
 from tests.builders.osm_text import crossing
 from tests.builders.sumo_wheel import write_programs, write_wheel
@@ -49,60 +47,34 @@ def drawn(draw, *arguments):
     return layout
 
 
-def dialog():
-    panel = SimpleNamespace(layout=DrawnLayout())
-    bpy.types.SEIP_OT_choose_place.draw(panel, bpy.context)
-    return panel.layout
-
-
-def test_panel_dialog_and_button_say_that_sumo_is_missing_before_the_last_click(chosen, online):
-    for layout in (drawn(site.draw, bpy.context), dialog()):
-        assert " ".join(layout.text.split()).count(preferences.NO_SUMO) == 1
-        assert ("seip.install_sumo", BUTTON) in layout.operators
+def test_panel_and_button_say_that_sumo_is_missing_before_the_last_click(chosen, online):
+    layout = drawn(site.draw, bpy.context)
+    assert " ".join(layout.text.split()).count(preferences.NO_SUMO) == 1
+    assert ("seip.install_sumo", BUTTON) in layout.operators
     chosen.seip.site.junction = chosen.seip.site.junctions[0].name
     assert preferences.NO_SUMO in drawn(site.draw, bpy.context).text
     with pytest.raises(RuntimeError, match=preferences.NO_SUMO):
         bpy.ops.seip.build_site()
-    with pytest.raises(RuntimeError, match=preferences.NO_SUMO):
-        bpy.ops.seip.choose_place()
     online(False)
     with pytest.raises(RuntimeError, match="Allow Online Access"):
         bpy.ops.seip.install_sumo()
 
 
-def rows(site, **choice):
-    """Return the number of rows of the dialog with a choice, and its message."""
-    for name in ("junction", "position", "region_shape", "radius", "terrain"):
-        site.property_unset(name)
-    for name, value in choice.items():
-        setattr(site, name, value)
-    layout = dialog()
-    return sum(map(len, (layout.labels, layout.properties, layout.operators))), " ".join(layout.text.split())
-
-
-def test_the_dialog_keeps_its_size_and_has_room_for_every_error(chosen, online):
-    site = chosen.seip.site
+def test_the_panel_says_which_place_is_chosen_or_what_is_wrong_with_it(chosen, online):
+    site_properties = chosen.seip.site
     link = "https://maps.example.org/" + "a-very-long-part-of-a-link/" * 8
-    choices = [
-        {"junction": site.junctions[0].name},
-        {"position": "52.5, 13.4", "region_shape": "CIRCLE"},
-        {"terrain": "//dem.tif"},
-        {"position": link},
-        {"position": "99, 13.4"},
-    ]
-    size, text = rows(site)
-    assert preferences.NO_SUMO in text
-    assert {rows(site, **choice)[0] for choice in choices} == {size}
-    online(False)
-    assert rows(site)[0] == size
-    assert "Allow Online Access" in rows(site)[1]
-    online(True)
-    bpy.ops.seip.install_sumo()
-    found = [rows(site, **choice) for choice in choices]
-    assert {number for number, _ in found} == {size}
-    messages = ["this junction", "this position", "No place|Choose a junction", "browser and copy", "latitude first"]
-    for (_, text), expected in zip(found, messages, strict=True):
-        assert any(part in text for part in expected.split("|"))
+    for choice, words in (
+        ({"junction": site_properties.junctions[0].name}, "this junction"),
+        ({"position": "52.5, 13.4", "region_shape": "CIRCLE"}, "this position"),
+        ({"terrain": "//dem.tif"}, "Choose a junction"),
+        ({"position": link}, "browser and copy"),
+        ({"position": "99, 13.4"}, "latitude first"),
+    ):
+        for name in ("junction", "position", "region_shape", "terrain"):
+            site_properties.property_unset(name)
+        for name, value in choice.items():
+            setattr(site_properties, name, value)
+        assert words in " ".join(drawn(site.draw, bpy.context).text.split())
 
 
 def test_after_the_installation_nothing_is_missing(chosen, tmp_path):
@@ -112,7 +84,7 @@ def test_after_the_installation_nothing_is_missing(chosen, tmp_path):
     layout = drawn(site.draw, bpy.context)
     assert preferences.NO_SUMO not in layout.text
     assert "seip.install_sumo" not in {name for name, _ in layout.operators}
-    status = drawn(sumo.draw_status)
+    status = drawn(preferences.draw_status)
     assert f"SUMO{SUMO_VERSION}in{where / 'bin'}" in "".join(status.text.split())
     assert not status.operators
     chosen.seip.site.junction = chosen.seip.site.junctions[0].name
@@ -122,6 +94,6 @@ def test_after_the_installation_nothing_is_missing(chosen, tmp_path):
 
 def test_a_sumo_that_does_not_start_can_be_replaced(scene, machine, tmp_path):
     write_programs(tmp_path / "own" / SUMO_VERSION, script="echo 'libGL.so.1 is missing' >&2; exit 127")
-    status = drawn(sumo.draw_status)
+    status = drawn(preferences.draw_status)
     assert "libGL.so.1 is missing" in status.text
     assert ("seip.install_sumo", BUTTON) in status.operators

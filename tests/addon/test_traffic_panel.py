@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from seip_addon.core.sensing.scans.frame import Frame
-from seip_addon.state.session import session
+from seip_addon.panel.session import session
 
 
 @pytest.fixture

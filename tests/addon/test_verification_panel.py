@@ -13,13 +13,12 @@ from seip_addon.core.output.results.verification_record import load_verification
 from seip_addon.core.sensing.lidar.catalogue import load_catalogue
 from seip_addon.core.site.scene_geometry import Mesh
 from seip_addon.core.workflows.verifying import verify
-from seip_addon.operators import verification as operators
-from seip_addon.operators.verification import SEIP_OT_verify
-from seip_addon.panels import traffic as panel
+from seip_addon.panel import verification as panel
+from seip_addon.panel.session import session
+from seip_addon.panel.verification import SEIP_OT_verify
 from seip_addon.scene import contract
 from seip_addon.scene.read import read_scene
 from seip_addon.scene.sensors import read_sensors
-from seip_addon.state.session import session
 from tests.builders.drawn_layout import DrawnLayout
 from tests.builders.site_recording import changed, save_site_recording
 from tests.builders.small_junction import box_triangles
@@ -84,14 +83,14 @@ def verified(placed, computed, monkeypatch):
         return computed[0]
 
     with monkeypatch.context() as within:
-        within.setattr(operators, "verify", remembered)
+        within.setattr(panel, "verify", remembered)
         assert bpy.ops.seip.verify() == {"FINISHED"}
     return placed
 
 
 def drawn():
     layout = DrawnLayout()
-    panel.draw_verification(layout, bpy.context)
+    panel.draw(layout, bpy.context)
     return layout
 
 
@@ -123,7 +122,7 @@ def test_the_scene_is_corrected_once_and_verified_again_without_changes(verified
     assert bpy.ops.seip.correct_scene() == {"FINISHED"}
     assert names(verified) == before - {GONE} | {"Found 1"}
     assert not bpy.ops.seip.correct_scene.poll()
-    assert operators.CHANGED in drawn().text
+    assert panel.CHANGED in drawn().text
     at = [one.xyz for one in read_sensors(verified, load_catalogue())]
     assert np.allclose(at, [np.array((9.5, 9.5, 6.0)) + SHIFT, np.array((-9.5, -9.5, 6.0)) + SHIFT], atol=0.02)
     assert bpy.ops.seip.verify() == {"FINISHED"}
@@ -133,10 +132,10 @@ def test_the_scene_is_corrected_once_and_verified_again_without_changes(verified
 
 
 def test_a_moved_object_makes_the_verification_old(verified):
-    assert operators.CHANGED not in drawn().text
+    assert panel.CHANGED not in drawn().text
     bpy.data.objects["building 0"].location.x += 1.0
     bpy.context.view_layer.update()
-    assert operators.CHANGED in drawn().text
+    assert panel.CHANGED in drawn().text
     with pytest.raises(RuntimeError, match="The scene has changed since"):
         bpy.ops.seip.correct_scene()
 
@@ -182,16 +181,16 @@ def test_each_mistake_has_its_sentence(placed, tmp_path, wrong, words):
 
 
 def test_a_saved_file_keeps_what_was_found(verified, tmp_path):
-    found = operators.sentences_of(verified)
+    found = panel.sentences_of(verified)
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "site.blend"))
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "site.blend"))
-    assert operators.sentences_of(bpy.context.scene) == found
+    assert panel.sentences_of(bpy.context.scene) == found
     assert len(found) == 3
     text = drawn().text
-    assert all(sentence in text for sentence in (*found, operators.NOT_VERIFIED))
-    assert operators.picture_of(bpy.context.scene).is_file()
+    assert all(sentence in text for sentence in (*found, panel.NOT_VERIFIED))
+    assert panel.picture_of(bpy.context.scene).is_file()
     bpy.context.scene.seip.result.folder = ""
-    assert operators.picture_of(bpy.context.scene) is None
+    assert panel.picture_of(bpy.context.scene) is None
     assert "wm.path_open" not in dict(drawn().operators)
     assert not bpy.ops.seip.correct_scene.poll()
 

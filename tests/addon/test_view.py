@@ -3,17 +3,13 @@
 import bpy
 import numpy as np
 import pytest
-from PIL import Image
 
 import seip_addon
-from seip_addon.core.output.pictures.labelled_view import GAP
-from seip_addon.core.output.pictures.plan_view import DPI, MAP_WIDTH, MARGIN
-from seip_addon.operators import view
+from seip_addon.panel import overlays
+from seip_addon.panel.coverage import SIGHT_LINES as SIGHT
+from seip_addon.panel.coverage import legend_of_coverage
+from seip_addon.panel.session import session
 from seip_addon.scene.sensors import placed_sensors
-from seip_addon.state.session import session
-from seip_addon.viewport import overlays
-from seip_addon.viewport.coverage import legend_of_coverage
-from seip_addon.viewport.sight_lines import NAME as SIGHT
 
 
 @pytest.fixture
@@ -72,17 +68,6 @@ def test_draw_handlers_are_always_removed(placed, ending):
     assert handler_count() == 0
     if ending == "unregister":
         seip_addon.register()
-
-
-def test_a_picture_has_the_view_and_the_plan(placed, tmp_path):
-    for _ in range(2):
-        path = view._free(view._named(str(tmp_path / "report.png")))  # noqa: SLF001  # as the operator names it
-        view.save_viewport_sheet(path, session.of(placed).state, np.zeros((540, 960, 3), dtype=np.uint8))
-    assert sorted(path.name for path in tmp_path.glob("*.png")) == ["report-2.png", "report.png"]
-    with Image.open(tmp_path / "report.png") as sheet:
-        plan = round(DPI * (MAP_WIDTH + 2 * MARGIN))
-        assert sheet.width == 2 * plan + 3 * GAP
-        assert sheet.width > sheet.height
 
 
 def test_a_placement_shows_its_coverage_with_legend_and_labels_and_so_does_the_file_when_it_is_opened(placed, tmp_path):

@@ -7,18 +7,15 @@ from unittest.mock import MagicMock
 import bpy
 import pytest
 
-from seip_addon import preferences, registration
 from seip_addon.core.base.acceptance import Acceptance
 from seip_addon.core.base.progress import Progress
 from seip_addon.core.choosing.placement.search_limits import SolverLimits
 from seip_addon.core.output.results.answer import sentence
 from seip_addon.core.output.results.placement_record import parsed_record
-from seip_addon.operators import base, results
-from seip_addon.panels import missing_package
-from seip_addon.panels import placement as placement_panel
-from seip_addon.panels.sidebar import draw_run
-from seip_addon.state.background import Background
-from seip_addon.state.session import RunningWork, session
+from seip_addon.panel import placement as placement_panel
+from seip_addon.panel import preferences, scene_status, work
+from seip_addon.panel.layout import draw_run
+from seip_addon.panel.session import RunningWork, session
 from tests.builders.drawn_layout import DrawnLayout
 
 
@@ -54,11 +51,11 @@ def test_a_damaged_record_is_not_shown_and_has_its_sentence(placed):
         record = json.loads(whole)
         change(record)
         placed.seip.result.record = json.dumps(record)
-        assert re.search(words, results.no_placement(placed))
+        assert re.search(words, scene_status.no_placement(placed))
         for button in (bpy.ops.seip.follow_sensors, bpy.ops.seip.evaluate_sensors, bpy.ops.seip.keep_placement):
             assert not button.poll()
     bpy.ops.seip.solve_placement()
-    assert not results.no_placement(placed)
+    assert not scene_status.no_placement(placed)
 
 
 def test_the_panel_says_what_the_record_holds(placed, monkeypatch):
@@ -93,28 +90,12 @@ def endless():
 
 
 def test_work_under_way_ends_with_the_add_on(add_on):
-    running = session.running = RunningWork("seip.check_site", Background(endless()))
+    running = session.running = RunningWork("seip.check_site", endless())
     running.timer = bpy.context.window_manager.event_timer_add(1.0, window=bpy.context.window)
-    base.forget()
+    work.forget()
     assert session.running is None
     assert running.timer is None
-    assert running.work.join(5.0)
-
-
-def test_a_broken_package_is_named_in_the_sidebar(monkeypatch):
-
-    def broken(name, package=None):
-        if name == ".properties.site":
-            raise ImportError("libgeos.so: cannot open shared object file", name="shapely.lib")
-        return come(name, package)
-
-    come = registration.importlib.import_module
-    monkeypatch.setattr(registration.importlib, "import_module", broken)
-    registration.register()
-    assert hasattr(bpy.types, "SEIP_PT_incomplete")
-    assert missing_package.MISSING == "shapely.lib"
-    registration.unregister()
-    assert not hasattr(bpy.types, "SEIP_PT_incomplete")
+    assert running.join(5.0)
 
 
 def test_the_best_so_far_can_be_used_while_a_search_runs_and_only_then(placed, monkeypatch):

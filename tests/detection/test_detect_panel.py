@@ -15,7 +15,7 @@ import bpy
 
 import seip_addon
 from seip_addon.core.output.results.detection_record import MAIN_RULE
-from seip_addon.panels.traffic import NAMES
+from seip_addon.panel.detection import NAMES
 from seip_addon.scene.write import write_result
 from tests.builders.small_junction import make_example
 

@@ -13,7 +13,7 @@ import bpy
 import seip_addon
 from seip_addon.core.output.results.placement_record import comparable, load_placement, parsed_record
 from seip_addon.core.workflows import finalists
-from seip_addon.panels import placement
+from seip_addon.panel import placement
 
 COARSE = ("--sensor", "vlp16", "--heights", "4", "6", "--grid", "4", "--spacing", "16", "--count", "1", "--no-render")
 

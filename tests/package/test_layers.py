@@ -95,8 +95,8 @@ def test_the_core_imports_nothing_above_it():
     assert not offenders(["seip_addon/core"], allowed)
 
 
-def test_the_bridge_imports_neither_commands_nor_operators():
-    above = ("headless", "seip_addon.operators", "seip_addon.panels", "seip_addon.properties", "seip_addon.preferences")
+def test_the_bridge_imports_neither_commands_nor_the_panel():
+    above = ("headless", "seip_addon.panel", "seip_addon.registration")
     assert not offenders(["seip_addon/scene"], lambda _, name: not name.startswith(above))
 
 

@@ -20,11 +20,8 @@ from typing import Any
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
 import bpy
-from bl_ext.user_default.seip.seip_addon import preferences
-from bl_ext.user_default.seip.seip_addon.panels import placement, results, sidebar
-from bl_ext.user_default.seip.seip_addon.state import scene_status
-from bl_ext.user_default.seip.seip_addon.state.session import SceneState, session
-from bl_ext.user_default.seip.seip_addon.viewport import search
+from bl_ext.user_default.seip.seip_addon.panel import layout, overlays, placement, preferences, scene_status
+from bl_ext.user_default.seip.seip_addon.panel.session import SceneState, session
 from driver import Steps, Window, play
 from mathutils import Vector
 
@@ -42,7 +39,7 @@ def _heard(sentence: Callable[..., None]) -> Callable[..., None]:
     return draw_and_note
 
 
-for module in (placement, results, sidebar):
+for module in (placement, layout):
     module.draw_sentence = _heard(module.draw_sentence)
 
 OUT = Path(sys.argv[sys.argv.index("--") + 1]).resolve()
@@ -226,8 +223,6 @@ def _report(window: Window) -> Steps:
     poses = {row["chosen"]: row["pose"] for row in rows if row["chosen"]}
     assert poses == {line["id"]: "" if line["pose"] is None else str(line["pose"]) for line in record["sensors"]}
     yield from window.picture("8-report")
-    yield from window.click("seip.save_picture(")
-    yield from window.until((OUT / "placement.png").exists, 60)
     bpy.context.window_manager.seip_sections.export = False
 
 
@@ -284,7 +279,7 @@ def _simulate(window: Window) -> Steps:
 
 
 def _import_map(window: Window) -> Steps:
-    """Import a map, as a dropped file is, through its map and its dialog, into a scene of its own."""
+    """Import a map, as a dropped file is, through its map and the sidebar, into a scene of its own."""
     before = set(bpy.data.scenes)
     with bpy.context.temp_override(window=window.window, area=window.area, region=window.region("WINDOW")):
         bpy.ops.seip.choose_map("INVOKE_DEFAULT", filepath=str(SCENES / "corridor.xodr"))
@@ -293,8 +288,8 @@ def _import_map(window: Window) -> Steps:
     yield from window.shot("12-map")
     yield from window.press("RET")  # from the map to the list of names
     yield 1.0
-    yield from window.shot("12-dialog")
-    yield from window.press("RET")
+    yield from window.shot("12-place")
+    yield from window.click("seip.build_site(")
     yield from window.until(lambda: session.running is None and set(bpy.data.scenes) - before, 120)
     yield from window.until(lambda: session.running is None and session.of(_scene()).check, 60)
     assert _scene() not in before
@@ -351,7 +346,7 @@ def _known() -> SceneState | None:
 
 def _drawn() -> bool:
     """Tell whether the best placement so far is drawn in the view."""
-    return search.NAME in session.overlays.get(_scene().session_uid, {})
+    return overlays.find(_scene(), placement.SEARCH) is not None
 
 
 def _sensors() -> list[bpy.types.Object]:

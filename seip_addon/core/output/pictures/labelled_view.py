@@ -7,11 +7,9 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.image import imread
 from matplotlib.patches import Rectangle
-from PIL import Image
 
 from ...choosing.placement.deployment import Deployment
 from ...site.site import Site
-from ...storage.files import whole_file
 from .colours import Legend
 from .drawing import (
     ATTRIBUTION_SIZE,
@@ -26,7 +24,7 @@ from .drawing import (
     save_png,
     text_width,
 )
-from .palette import INK, PAPER
+from .palette import INK
 from .viewpoint import Sight
 
 DPI = 160
@@ -35,7 +33,6 @@ LEGEND_GAP, SWATCH = 0.22, 0.3  # inches
 LEGEND_SIZE = 9.5  # points
 BACKGROUND_COLOUR = "#e9edf0"
 HIDDEN_NOTE = "outlined sensors stand behind something"
-GAP = 24  # pixels between the two, and around them
 
 
 def save_labelled_view(  # noqa: PLR0913  # what is written on the picture
@@ -112,13 +109,3 @@ def _draw_foot(
         y = height - MARGIN / 4 - (len(credit) - number - 0.5) * CREDIT_LINE
         plain: Style = {"size": ATTRIBUTION_SIZE, "color": INK, "parse_math": False, "va": "center"}
         foot.text(MARGIN, y, words, **plain)
-
-
-def save_sheet(path: str | os.PathLike[str], view: Image.Image, plan: Image.Image) -> None:
-    """Put a view to the left of a plan, scaled to the plan's width, as PNG."""
-    high = round(view.height * plan.width / view.width)
-    sheet = Image.new("RGB", (2 * plan.width + 3 * GAP, max(high, plan.height) + 2 * GAP), PAPER)
-    sheet.paste(view.convert("RGB").resize((plan.width, high), Image.Resampling.LANCZOS), (GAP, GAP))
-    sheet.paste(plan.convert("RGB"), (plan.width + 2 * GAP, GAP))
-    with whole_file(path) as temporary:
-        sheet.save(temporary, format="PNG")

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import functools
-import re
 import shutil
 from collections.abc import Generator, Mapping
 from pathlib import Path
@@ -28,7 +26,6 @@ _CHUNK = ArrayFile(
     {"packed": "u1", "rays": "i8"},
     compressed=False,
 )
-_GRID = re.compile(r"[0-9a-f]{32}\.(npz|pieces|returns\.npz)")
 
 
 class CheckpointFolder:
@@ -120,43 +117,3 @@ def read_visibility(
         return None
     key, shape = visibility_key(site, models, settings, engine_name(engine)), (len(site.candidates), len(site.targets))
     return stored if stored.key == key and stored.shape == shape else None
-
-
-class GridFolder:
-    """A folder of grids, named by their keys; other files in it are left alone."""
-
-    def __init__(self, path: Path) -> None:
-        self._path = path
-
-    def megabytes(self) -> float:
-        """Return the size of all grids; it is cached while the folder does not change, for panels that draw often."""
-        try:
-            return _megabytes(self._path, self._path.stat().st_mtime_ns)
-        except OSError:  # there is no such folder
-            return 0.0
-
-    def empty(self) -> int:
-        """Delete all grids and chunks of grids, and return their number.
-
-        Raises
-        ------
-        SeipError
-            A file or folder cannot be deleted.
-        """
-        entries = _grids(self._path)
-        for entry in entries:
-            try:
-                shutil.rmtree(entry) if entry.is_dir() else entry.unlink()
-            except OSError as error:
-                raise SeipError(f"cannot delete {entry}: {error.strerror}; delete it by hand") from error
-        return len(entries)
-
-
-def _grids(folder: Path) -> list[Path]:
-    return sorted(entry for entry in folder.iterdir() if _GRID.fullmatch(entry.name)) if folder.is_dir() else []
-
-
-@functools.lru_cache(maxsize=4)
-def _megabytes(folder: Path, _changed: int) -> float:
-    files = [file for entry in _grids(folder) for file in (entry.rglob("*") if entry.is_dir() else (entry,))]
-    return sum(file.stat().st_size for file in files) / 1e6

@@ -9,7 +9,7 @@ from seip_addon.core.base.progress import Pace, Progress
 from seip_addon.core.sensing.lidar.catalogue import load_catalogue
 from seip_addon.core.sensing.visibility.grid import compute_visibility
 from seip_addon.core.sensing.visibility.settings import VisibilitySettings
-from seip_addon.state.background import Background
+from seip_addon.panel.session import RunningWork
 from tests.builders.synthetic_junction import junction_site
 
 SITE = junction_site(positions=80, heights=[4.0, 6.0, 8.0], spacing=1.0)
@@ -24,7 +24,7 @@ def counting(number):
 
 
 def test_the_result_comes_back():
-    work = Background(counting(5))
+    work = RunningWork("", counting(5))
     assert work.result() == 5
     assert work.ended
 
@@ -34,7 +34,7 @@ def test_an_error_comes_back():
         yield Progress(0, 1, "fail")
         raise SeipError("no")
 
-    work = Background(failing())
+    work = RunningWork("", failing())
     with pytest.raises(SeipError, match="no"):
         work.result()
 
@@ -53,7 +53,7 @@ def test_the_pace_tells_how_long_it_takes_still():
 def test_stopped_visibility_ends_soon(engine):
     if engine == "bvh":
         pytest.importorskip("bpy")
-    work = Background(compute_visibility(SITE, MODELS, VisibilitySettings(), engine))
+    work = RunningWork("", compute_visibility(SITE, MODELS, VisibilitySettings(), engine))
     while not work.progress.total:
         time.sleep(0.01)
     time.sleep(0.2)

@@ -1,1 +1,0 @@
-"""Operators: thin wrappers of core functions."""

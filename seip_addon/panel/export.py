@@ -1,0 +1,118 @@
+"""The section "Export": files of the placement and the report on them."""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from dataclasses import replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import bpy
+
+from ..core.base.progress import Progress
+from ..core.output.pictures.colours import unpacked_counts
+from ..core.output.report.sections import write_report
+from ..core.output.results.placement_record import parsed_record
+from ..core.storage.files import check_folder
+from ..scene.blend_file import save_blend
+from ..scene.coverage_colours import show_seen_by
+from ..scene.gltf import save_glb
+from ..scene.pieces import tidy_pieces
+from ..scene.read import attribution_of
+from ..scene.render_elsewhere import render_elsewhere
+from ..scene.result_folder import result_files, write_pictures, write_tables
+from ..scene.write import coverage_of, shown_legend
+from . import scene_status
+from .layout import draw_path, draw_reason, draw_run
+from .properties import absolute, saved_path
+from .scene_status import no_folder, not_evaluated
+from .session import SceneState, session
+from .survey import with_placement
+from .work import ForPlacement, Job, LongWork, started
+
+
+class _Writes(ForPlacement, LongWork):
+    """Mixin for operators that write the placement into the folder of the result."""
+
+    obstacles = (*ForPlacement.obstacles, no_folder, not_evaluated)
+
+
+def _checked_folder(scene: bpy.types.Scene) -> Path:
+    """Return the folder of the result, which can be written."""
+    folder = saved_path(scene.seip.result.folder, "the result")
+    check_folder(folder)
+    return folder
+
+
+class SEIP_OT_export_result(_Writes, bpy.types.Operator):
+    """Write tables, pictures and the scene with its sensors to the folder, replacing earlier ones"""
+
+    bl_label = "Export"
+    stopped_message = "stopped; nothing was written"
+
+    def job(self, scene: bpy.types.Scene) -> Job:
+        """Save the scene as it is, find the placement again and write it, and report where the files are."""
+        folder = _checked_folder(scene)
+        scene, state = yield started(_exported(folder, scene))
+        session.of(scene).state = state
+        self.report({"INFO"}, f"written to {folder}")
+
+
+def _exported(folder: Path, scene: bpy.types.Scene) -> Generator[Progress, None, SceneState]:
+    """Write a result: the scene before the first report, which is the part that needs Blender's data."""
+    render, name = scene.seip.result.render, scene.name
+    finding = with_placement(scene)
+    if coverage_of(scene) is not None:
+        show_seen_by(scene, unpacked_counts(scene.seip.result.seen))  # it may show a comparison, or sensors on the move
+    legend = shown_legend(scene)
+    tidy_pieces(scene)
+    with result_files(folder) as part:
+        save_blend(part["placed.blend"])
+        save_glb(part["scene.glb"], attribution_of(scene))
+        yield Progress(0, 0, "reading the scene")
+        state = yield from finding
+        survey, solution = state.placed()
+        record = parsed_record(state.record)
+        record = replace(record, settings={**record.settings, "render": render})
+        plans = yield from write_tables(part, survey, solution, record)
+        deployment = solution.deployment
+        with TemporaryDirectory(prefix="seip-") as raw:
+            rendered = None
+            if render:
+                rendered = yield from render_elsewhere(Path(raw), part["placed.blend"], name, survey.site, deployment)
+            write_pictures(part, survey, record, deployment, plans, rendered, legend)
+    survey.grid.save(folder / "visibility.npz")
+    return state
+
+
+class SEIP_OT_write_report(_Writes, bpy.types.Operator):
+    """Write the files of the placement to the folder, and a report on them as HTML and PDF"""
+
+    stopped_message = "stopped; no report was written"
+
+    def job(self, scene: bpy.types.Scene) -> Job:
+        """Export the placement, write the report, and say where the files are."""
+        folder = _checked_folder(scene)
+        scene, (state, written) = yield started(_reported(folder, scene))
+        session.of(scene).state = state
+        self.report({"INFO"}, f"written: {' and '.join(path.name for path in written)} in {folder}")
+
+
+def _reported(folder: Path, scene: bpy.types.Scene) -> Generator[Progress, None, tuple[SceneState, tuple[Path, ...]]]:
+    state = yield from _exported(folder, scene)
+    return state, (yield from write_report(folder))
+
+
+def draw(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+    """Draw the folder and the buttons."""
+    scene = context.scene
+    if draw_reason(layout, scene_status.no_placement(scene)):
+        return
+    draw_path(layout, scene.seip.result, "folder")
+    layout.prop(scene.seip.result, "render")
+    draw_reason(layout, scene_status.no_folder(scene) or scene_status.not_evaluated(scene))
+    draw_run(layout, "seip.write_report", icon="FILE_TEXT")
+    draw_run(layout, "seip.export_result", icon="EXPORT", text="Export Files")
+    folder = absolute(scene.seip.result.folder)
+    if folder.is_dir():
+        layout.operator("wm.path_open", text="Open Folder", icon="FILE_FOLDER").filepath = str(folder)

@@ -1,1 +1,0 @@
-"""Panels of the sidebar, in the order of the workflow."""

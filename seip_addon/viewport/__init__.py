@@ -1,1 +1,0 @@
-"""Viewport overlays, which are no part of the scene."""
