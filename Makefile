@@ -14,7 +14,7 @@
 # make detector    train a detector as the shipped one, at 64 random sites (needs a GPU)
 # make stability   drive every method to where it fails, and write docs/stability.md (an hour)
 # make traffic     simulate the shipped traffic again (installs Eclipse SUMO in the environment: 230 MB)
-# make benchmark   measure speed, accuracy and growth again, and write docs/benchmark.md (20 minutes)
+# make benchmark   measure speed again, and write docs/benchmark.md (15 minutes)
 # make extension   build the Blender extension in dist/
 # make lock        write wheels.lock again, the digests of all pinned packages, after a pin has changed
 # make clean       remove what was built; make distclean removes the environment and the wheels as well

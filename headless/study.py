@@ -26,7 +26,7 @@ STUDIES = {
     "open-benchmark": "criteria and placements scored on ten junctions",
     "paper": "the paper's case study on its map and traffic",
     "stability": "limits of every method",
-    "benchmark": "speed against accuracy, and growth",
+    "benchmark": "speed of visibility, placement and scans",
 }
 """Studies by name: a folder each in `headless/studies`."""
 
