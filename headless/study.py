@@ -23,7 +23,7 @@ STUDIES = {
     "criteria": "placement criteria compared by what a detector finds",
     "random-sites": "random sites with traffic, to train detectors on",
     "site-training": "training of a detector on several sites",
-    "open-benchmark": "criteria and placements scored on ten junctions",
+    "open-benchmark": "placement criteria scored on ten junctions",
     "paper": "the paper's case study on its map and traffic",
     "stability": "limits of every method",
     "benchmark": "speed of visibility, placement and scans",
