@@ -58,12 +58,7 @@ _MOST_BYTES = 1 << 26
 
 def main(argv: list[str]) -> None:
     """Choose the sites, allocate the budget, and write the network."""
-    parser = _parser()
-    options, rest = parser.parse_known_args(argv)
-    if rest and rest[0].replace("_", "").isdecimal():  # amounts for phases, in earlier versions
-        raise SeipError("--budget takes one amount: networks no longer have phases, so give the whole of it at once")
-    if rest:
-        parser.error(f"unrecognized arguments: {' '.join(rest)}")
+    options = _parser().parse_args(argv)
     if (options.coverage is None) == (options.budget is None):
         raise SeipError("give either --budget, or --coverage, to be reached at every site")
     if options.installed_cost is None:

@@ -30,16 +30,6 @@ STUDIES = {
 }
 """Studies by name: a folder each in `headless/studies`."""
 
-REMOVED = {
-    "calibration": "docs/sensors.md has its figures",
-    "detector-settings": "docs/detection.md has its figures",
-    "field-recordings": "docs/recordings.md has its figures; `make recording` writes the shipped recording again",
-    "ingredients": "docs/detection.md has its figures",
-    "network-practice": "docs/network.md has its figures",
-    "network-scale": "docs/network.md has its figures",
-}
-"""Studies of earlier versions, and where their figures are."""
-
 
 def main(argv: list[str]) -> None:
     """Run the study that the first argument names, with the arguments after it."""
@@ -47,8 +37,6 @@ def main(argv: list[str]) -> None:
         runtime.print_line(_usage())
         return
     name = argv[0]
-    if name in REMOVED:
-        raise SeipError(f"there is no study {name!r} any more: {REMOVED[name]}")
     if name not in STUDIES:
         raise SeipError(f"there is no study {name!r}: seip study --help lists the studies")
     importlib.import_module(f"headless.studies.{name.replace('-', '_')}.command").main(argv[1:])

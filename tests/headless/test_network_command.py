@@ -107,7 +107,6 @@ def test_budget_goes_to_the_heavier_site_and_an_interrupted_run_resumes_beside_a
         (("--budget", "1000", "--coverage", "0.5"), "give either --budget"),
         (("--budget", "1000", "--junctions", "signals"), "choose junctions of an extract"),
         (("--budget", "1000", "--sensor", "os1_129"), "os1_129"),
-        (("--budget", "1000", "2_000"), "one amount"),
     ],
 )
 def test_faulty_requests_are_refused_before_anything_is_built(tmp_path, options, fault):
