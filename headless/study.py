@@ -24,7 +24,7 @@ STUDIES = {
     "random-sites": "random sites with traffic, to train detectors on",
     "site-training": "training of a detector on several sites",
     "open-benchmark": "placement criteria scored on ten junctions",
-    "paper": "the paper's case study on its map and traffic",
+    "paper": "the paper's case study on its map",
     "stability": "limits of every method",
     "benchmark": "speed of visibility, placement and scans",
 }

@@ -1,8 +1,10 @@
 """Detection with many placements that share poses: each pose scans a frame once, for all placements that have it."""
 
 from collections.abc import Generator, Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
+from seip_addon.core.base.arrays import Boolean
 from seip_addon.core.base.progress import Progress
 from seip_addon.core.sensing.scans.frame import Frame
 from seip_addon.core.sensing.scans.scanner import Scanner
@@ -14,7 +16,6 @@ from seip_addon.core.storage.source_digest import source_digest
 
 from .detector import Detector
 from .detector_evaluation import AT_ONCE, side_by_side
-from .frame_points import some_points
 from .frame_results import FrameResult, frame_result
 from .inference import detect
 from .recordings import MountedSensors, SampledRun, Simulator, frames_key
@@ -22,6 +23,8 @@ from .stored_detections import load_frames, save_frames
 from .training import deterministic
 
 FOLDER = "detections"
+POINT_FIELDS = ("points", "sensor", "delay", "intensity", "instance", "foreground")
+"""Arrays of a frame with an entry for each point."""
 
 
 class SharedScans:
@@ -155,6 +158,11 @@ def _detected(
         run=run.name,
         parked=run.parked,
     )
+
+
+def some_points(frame: Frame, kept: Boolean) -> Frame:
+    """Return the frame with the points of a mask (n,); the counts in its labels are those of all points."""
+    return replace(frame, **{name: getattr(frame, name)[kept] for name in POINT_FIELDS})
 
 
 def _bodies(run: SampledRun) -> list[Body]:

@@ -8,7 +8,7 @@ from collections.abc import Generator
 from dataclasses import dataclass, fields
 from pathlib import Path
 
-from headless.studies.random_sites.production import SiteSettings, make_site
+from headless.studies.random_sites.production import APPROACHES, SiteSettings, make_site
 
 import bpy
 
@@ -23,8 +23,8 @@ from seip_addon.scene.build import build_scene
 from seip_addon.scene.read import read_scene
 
 SITES = Path(__file__).with_name("sites.toml")
-SEED, APPROACHES = 2026, 60.0
-"""Seed of the random sites, and length of the streets in the regions (metres)."""
+SEED = 2026
+"""Seed of the random sites."""
 RUNS, DURATION = 8, 40.0
 """Number of runs of traffic at each site, and their duration (seconds)."""
 
@@ -95,9 +95,7 @@ def build_benchmark_site(site: BenchmarkSite, folder: Path, extracts: Path) -> G
     folder.mkdir(parents=True, exist_ok=True)
     scene = folder / "site.blend"
     if site.number:
-        settings = SiteSettings(
-            SEED, RUNS, DURATION, approaches=APPROACHES, tram=site.tram, pedestrians=site.pedestrians
-        )
+        settings = SiteSettings(SEED, RUNS, DURATION, tram=site.tram, pedestrians=site.pedestrians)
         yield from make_site(folder, settings, site.number)
         return scene
     traffic = traffic_folder(scene)

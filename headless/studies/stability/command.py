@@ -11,13 +11,12 @@ from pathlib import Path
 
 from headless import runtime, survey
 from headless.charts import robustness as robustness_charts
-from headless.options import new_parser
 from headless.studies.stability.charts import save_convergence_chart, save_delta_chart
 from headless.studies.stability.criterion import criterion_rows, criterion_study
 from headless.studies.stability.page import Chapter, save_page
 from headless.studies.stability.robustness_rows import pose_rows, robust_rows, traffic_rows
 from headless.studies.stability.weather import COUNT, SENSOR, weather_rows, weather_study
-from headless.studies.survey_options import add_survey_options
+from headless.studies.survey_options import study_parser
 
 from seip_addon.core.base.progress import Progress
 from seip_addon.core.choosing.placement.objective import DEFAULT_COUNT, Objective, check_objective, placement_problem
@@ -95,8 +94,7 @@ Work = Callable[[StudiedScene], Generator[Progress, None, Chapter]]
 
 def main(argv: list[str], scope: StabilityScope | None = None) -> None:
     """Study all chapters, and write the page; tests pass a small ``scope``."""
-    parser = new_parser("study stability", "Find the limits of every method, and write a page with charts.")
-    add_survey_options(parser)
+    parser = study_parser("stability", "Find the limits of every method, and write a page with charts.")
     parser.add_argument("--work", type=Path, default=Path("out/stability"), help="folder for the visibility grid")
     options = parser.parse_args(argv)
     charts = options.output / "stability"
