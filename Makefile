@@ -48,7 +48,7 @@ site: sumo
 
 network: sumo
 	$(PY) -m headless.network scenes/town.osm --junctions all --budget 150_000 --gap 0.05 -o out/town
-	@echo "map: out/town/network.html, report: out/town/report.html, report.pdf"
+	@echo "report: out/town/report.html, report.pdf"
 
 test: environment
 	$(PY) -m pytest $(SPREAD) --ignore tests/studies --ignore tests/detection -m "not slow and not long"

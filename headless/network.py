@@ -96,7 +96,7 @@ def main(argv: list[str]) -> None:
     where = f"{len(equipped)} of {counted(len(record.sites), 'site')}"
     runtime.print_line(f"{counted(sensors, 'sensor')} at {where}, ${record.price_usd:,.0f}")
     runtime.print_line(record.certificate)
-    runtime.print_line(f"written to {options.output}/: network.html is the map, report.html the report")
+    runtime.print_line(f"written to {options.output}/: report.html and report.pdf show the result")
 
 
 class _Sources:

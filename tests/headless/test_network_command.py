@@ -35,7 +35,7 @@ def content(folder):
     return {
         str(path.relative_to(folder)): path.read_bytes()
         for path in sorted(folder.rglob("*"))
-        if path.name in {"network.json", "network.geojson", "sites.csv", "searches.json", "problem.npz", "network.html"}
+        if path.name in {"network.json", "network.geojson", "sites.csv", "searches.json", "problem.npz", "map.png"}
     }
 
 

@@ -14,22 +14,13 @@ from ...choosing.placement.returns_summary import returns_text
 from ...storage.json_dataclass import as_json
 from ..pictures.drawing import percent
 
-SCHEMA = "seip-network/2"
+SCHEMA = "seip-network/3"
 
 PROVEN = 1e-9
 """Gap up to which a network is proven optimal: smaller differences are rounding, as in `problem.TIE_TOLERANCE`."""
 COVERAGE_STEPS, RETURNS_STEPS = (0.2, 0.4, 0.6, 0.8), (1.0, 5.0, 20.0, 100.0)
 """Coverages, and typical returns, at which a site gets the next of `SHARE_COLOURS`."""
 _ORDER = ("equipped", "without sensor", "failed")
-
-
-@dataclass(frozen=True)
-class NetworkPoint:
-    """Best value of the criterion found for at most an amount of money, and the proven bound on it."""
-
-    price_usd: float
-    value: float
-    bound: float
 
 
 @dataclass(frozen=True)
@@ -72,8 +63,6 @@ class NetworkSite:
         Value of the criterion at the site with its sensors, and a bound on it for that money.
     coverage : float, 0 to 1
         Share of the road that its sensors see.
-    frontier : tuple of NetworkPoint
-        Best values for amounts of money, as far as the allocation needed them; prices rise.
     """
 
     name: str
@@ -88,7 +77,6 @@ class NetworkSite:
     bound: float = 0.0
     coverage: float = 0.0
     sensors: tuple[NetworkSensor, ...] = ()
-    frontier: tuple[NetworkPoint, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -103,8 +91,6 @@ class NetworkRecord:
         ``road``: share of the targets on the road that are seen, 0 to 1. ``returns``: mean of ln(1 + expected returns)
         of road users. The value of the network is the mean over its sites, by their weights; sites that failed are left
         out.
-    curve : tuple of NetworkPoint
-        Value of the network for amounts of money; prices rise.
     sensor_types : tuple of str
         Types to choose from, by their keys in the catalogue; ``sensor_names`` has the products.
     created : str
@@ -122,7 +108,6 @@ class NetworkRecord:
     value: float
     bound: float
     sites: tuple[NetworkSite, ...]
-    curve: tuple[NetworkPoint, ...]
     sensor_types: tuple[str, ...]
     sensor_names: Mapping[str, str] = field(default_factory=dict)
     attribution: tuple[str, ...] = ()
