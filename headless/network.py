@@ -10,7 +10,6 @@ import json
 import math
 import os
 import shutil
-import sys
 from collections.abc import Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
@@ -52,7 +51,6 @@ from seip_addon.core.world.openstreetmap.streets import importance, is_street
 MOST_SENSORS = 8
 SECONDS_PER_SITE, MEMORY_PER_WORKER, DISK_PER_SITE = 20.0, 1.5, 6.0
 """Seconds of a worker, GiB and MB for a typical site; the seconds are those of `make network` on two workers."""
-LONG = 7200.0  # seconds from which a run must be confirmed
 _MOST_BYTES = 1 << 26
 
 
@@ -79,7 +77,7 @@ def main(argv: list[str]) -> None:
     if options.scheduler is None:
         _check_sumo(places, options.output)
     number = options.workers or _usual_workers()
-    _confirm(options, len(places), number)
+    _state_needs(options, len(places), number)
     source = _Sources(request)
     try:
         with connected(options.scheduler, number) as client, runtime.progress_bar() as report:
@@ -184,8 +182,8 @@ def _usual_workers() -> int:
     return max(1, math.floor(min(cores, _memory() / MEMORY)))
 
 
-def _confirm(options: argparse.Namespace, sites: int, number: int) -> None:
-    """State what a run needs at most; ask before a large one, and refuse it where nobody can answer."""
+def _state_needs(options: argparse.Namespace, sites: int, number: int) -> None:
+    """State what a run needs at most; refuse one for which the disk has no room."""
     disk = sites * DISK_PER_SITE / 1000.0
     free = shutil.disk_usage(options.output).free / 1e9
     if free < disk:
@@ -194,14 +192,7 @@ def _confirm(options: argparse.Namespace, sites: int, number: int) -> None:
     needs = f"about {_duration(seconds)} on {counted(number, 'worker')}, {memory:g} GiB of memory"
     if options.scheduler is not None:
         needs = f"about {_duration(sites * SECONDS_PER_SITE)} of one worker, {MEMORY_PER_WORKER:g} GiB for each worker"
-    needs = f"{counted(sites, 'site')}: {needs} and {disk:.2g} GB on the disk if none is finished"
-    large = seconds > LONG or memory * 2**30 > _memory()
-    asks = large and not options.yes and options.scheduler is None
-    if asks and not (sys.stdin and sys.stdin.isatty()):
-        raise SeipError(f"{needs}: choose fewer sites, or confirm by --yes")
-    runtime.LOG.info(needs)
-    if asks and input("go on? [y/N] ").strip().casefold() not in {"y", "yes"}:
-        raise SeipError("not started: choose fewer sites, or a cluster by --scheduler")
+    runtime.LOG.info(f"{counted(sites, 'site')}: {needs} and {disk:.2g} GB on the disk if none is finished")
 
 
 def _duration(seconds: float) -> str:
@@ -255,7 +246,6 @@ def _parser() -> argparse.ArgumentParser:
     work = parser.add_argument_group("work")
     work.add_argument("--scheduler", metavar="ADDRESS", help="Dask scheduler: tcp://host:8786 or tls://host:8786")
     work.add_argument("--workers", type=whole_number(Limits(1, 1024)), metavar="N", help="processes on this machine")
-    work.add_argument("--yes", action="store_true", help="start long runs without asking")
     return parser
 
 

@@ -11,7 +11,6 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from seip_addon.core.base.arrays import Float
-from seip_addon.core.base.errors import SeipError
 from seip_addon.core.output.pictures.chart_style import (
     FAINT_COLOUR,
     colour,
@@ -76,7 +75,6 @@ def save_precision_recall_chart(
     path: str | os.PathLike[str], curves: Sequence[PrecisionRecallLine], title: str
 ) -> None:
     """Draw precision against recall, a colour for each type and a stroke for each number of sensors, as PNG."""
-    check_drawn(curves, "precision against recall")
     figure, (panel,) = new_figure(*PANEL_SIZE)
     sensors = list(dict.fromkeys(curve.sensor for curve in curves))
     counts = sorted({curve.count for curve in curves}, reverse=True)
@@ -98,7 +96,6 @@ def save_parts_chart(path: str | os.PathLike[str], panels: Sequence[BinnedFigure
     panels : sequence of BinnedFigure
         Numbers of road users are drawn behind the lines where the bins of the first line have any.
     """
-    check_drawn(panels, "detection by parts of the road users")
     figure, axes = new_figure(PANEL_SIZE[0] * 0.85 * len(panels), PANEL_SIZE[1], len(panels))
     for panel, (what, name_of_figure, lines) in zip(axes, panels, strict=True):
         first = next(iter(lines.values()))
@@ -128,7 +125,6 @@ def save_training_chart(
     validation : mapping of int to float
         Average precision by number of steps; the best is marked.
     """
-    check_drawn(loss, "a training")
     figure, (panel,) = new_figure(PANEL_SIZE[0] * 1.25, PANEL_SIZE[1])
     each = np.arange(1, len(loss) + 1)
     panel.plot(each, loss, color=FAINT_COLOUR, linewidth=0.7, label="loss")
@@ -156,12 +152,6 @@ def save_training_chart(
         for side in ("top", "left"):
             beside.spines[side].set_visible(False)
     save_chart(path, figure, title, panels)
-
-
-def check_drawn(drawn: Sequence[object] | Mapping[str, object], what: str) -> None:
-    """Raise SeipError if there is nothing to draw in a chart of `what`."""
-    if not drawn:
-        raise SeipError(f"there are no data for a chart of {what}: evaluate a detector first")
 
 
 def placement_name(count: int, sensor: str) -> str:

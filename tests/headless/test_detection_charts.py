@@ -8,7 +8,6 @@ from headless.charts.detection import (
     PrecisionRecallLine,
     save_parts_chart,
     save_precision_recall_chart,
-    save_training_chart,
 )
 from headless.charts.error_view import ErrorView, save_error_view
 
@@ -17,7 +16,6 @@ import pytest
 import shapely
 from matplotlib.collections import PolyCollection
 
-from seip_addon.core.base.errors import SeipError
 from seip_addon.core.output.pictures import chart_style as style
 from tests.builders.charts import is_drawn, legend, line, record_figures, words
 
@@ -105,18 +103,3 @@ def test_error_view(tmp_path, figures):
     (missed,) = middles(panel, error_view.TRUTH_COLOUR, error_view.ERROR)
     assert missed == pytest.approx([20, 5], abs=0.2)
     assert len(middles(panel, error_view.DETECTED_COLOUR, error_view.ERROR)) == 2
-
-
-@pytest.mark.parametrize(
-    "draw",
-    [
-        lambda path: save_precision_recall_chart(path, [], "Junction"),
-        lambda path: save_parts_chart(path, [], "Junction"),
-        lambda path: save_training_chart(path, [], {}, "Junction"),
-        lambda path: save_error_view(path, [], "Junction"),
-    ],
-)
-def test_nothing_to_draw_is_said(tmp_path, draw):
-    with pytest.raises(SeipError, match=r"there are no data for a chart|there are no frames to draw"):
-        draw(tmp_path / "chart.png")
-    assert not (tmp_path / "chart.png").exists()

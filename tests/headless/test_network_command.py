@@ -117,16 +117,6 @@ def test_faulty_requests_are_refused_before_anything_is_built(tmp_path, options,
         network.main([str(table), "-o", str(tmp_path / "city"), *options])
 
 
-def test_long_runs_without_a_terminal_need_to_be_confirmed(tmp_path, monkeypatch):
-    monkeypatch.setattr("sys.stdin", None)
-    (tmp_path / "a.blend").write_bytes(b"")
-    table = tmp_path / "sites.csv"
-    rows = "".join(f"a.blend,{number / 100:.2f},7\n" for number in range(400))
-    table.write_text(f"source,latitude,longitude\n{rows}", encoding="utf-8")
-    with pytest.raises(SeipError, match="--yes"):
-        network.main([str(table), "-o", str(tmp_path / "city"), "--budget", "1000", "--workers", "1"])
-
-
 def test_an_extract_without_sumo_is_refused_before_anything_is_built(tmp_path, monkeypatch):
     town, output = JUNCTION.with_name("town.osm"), tmp_path / "town"
     monkeypatch.setenv("PATH", "")

@@ -9,7 +9,6 @@ from typing import Any
 from headless.charts.detection import (
     PANEL_SIZE,
     PRECISION_LABEL,
-    check_drawn,
     mark_style,
     placement_name,
 )
@@ -68,7 +67,6 @@ class PrecisionCell:
 
 def save_price_chart(path: str | os.PathLike[str], cells: Sequence[PrecisionCell], title: str) -> None:
     """Draw average precision against price, with its front, as PNG."""
-    check_drawn(cells, "average precision against price")
     figure, (panel,) = new_figure(PANEL_SIZE[0] * 1.25, PANEL_SIZE[1])
     for row, sensor in enumerate(dict.fromkeys(cell.sensor for cell in cells)):
         own = [cell for cell in cells if cell.sensor == sensor]

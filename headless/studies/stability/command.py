@@ -155,16 +155,12 @@ def poses(scene: StudiedScene) -> Generator[Progress, None, Chapter]:
     under_errors = yield from pose_study(surroundings(survey), deployment, errors, 0, scene.scope.draws)
     robustness_charts.save_spread_chart(scene.charts / "spread.png", study, f"{scene.placed} under pose errors")
     robustness_charts.save_loss_chart(scene.charts / "blame.png", under_errors, f"{scene.placed}: what costs coverage")
-    robustness_charts.save_frontier_chart(
-        scene.charts / "frontier.png", study, f"{scene.placed}: what robustness costs and saves"
-    )
     return Chapter(
         f"Pose errors: {scene.placed}",
         (*pose_rows(under_errors), *robust_rows(study)),
         {
             "spread.png": "Distribution of coverage over unseen draws: nominal optimum and robust placements",
             "blame.png": "Mean loss with errors of only one sensor, and with only one kind of error",
-            "frontier.png": "Cost of robustness in planned coverage, and gain in the 5 % quantile",
         },
     )
 
