@@ -10,7 +10,6 @@ from headless.charts.detection import (
     PANEL_SIZE,
     PRECISION_LABEL,
     mark_style,
-    placement_name,
 )
 
 import numpy as np
@@ -62,7 +61,7 @@ class PrecisionCell:
     @property
     def name(self) -> str:
         """Name in charts."""
-        return placement_name(self.count, self.sensor)
+        return f"{self.count} × {self.sensor}"
 
 
 def save_price_chart(path: str | os.PathLike[str], cells: Sequence[PrecisionCell], title: str) -> None:
