@@ -6,7 +6,7 @@ per seed on all placements at once; `evaluate_all` evaluates each detector with 
 """
 
 import math
-from collections.abc import Generator, Iterable, Sequence
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import chain, combinations
 from pathlib import Path
@@ -42,6 +42,9 @@ SPLIT = "the last half is for tests, an eighth before it (at least one) for vali
 """Split of the runs, as a message."""
 
 TEST_STRIDE = 2  # only every second frame is tested, as successive frames are similar
+
+TrainingSet = tuple[list[SampledRecording], list[SampledRecording]]
+"""Training and validation recordings of all sensor configurations."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -190,37 +193,21 @@ def place_all(survey: Survey) -> Generator[Progress, None, tuple[SensorConfigura
     return tuple(map(SensorConfiguration.of_case, cases))
 
 
-@dataclass(frozen=True, eq=False)
-class TrainingSet:
-    """Training and validation recordings of all sensor configurations."""
-
-    training: list[SampledRecording]
-    validation: list[SampledRecording]
-
-
 def simulate_training_set(
     simulator: Simulator, configurations: Sequence[SensorConfiguration], traffic: Traffic, network: NetworkSettings
 ) -> Generator[Progress, None, TrainingSet]:
-    """Simulate training and validation frames of all configurations, and store them as samples for a network."""
+    """Simulate training and validation frames of all configurations as samples for a network."""
     area = simulator.area(network.pillar)
 
     def samples(configuration: SensorConfiguration, runs: Sequence[SampledRun]) -> list[SampledRecording]:
         return [SampledRecording(recorded(simulator, configuration, run), area, network.most_points) for run in runs]
 
-    training = {one.name: samples(one, traffic.training) for one in configurations}
-    validation = {one.name: samples(one, traffic.validation) for one in configurations}
-    ordered = most_rays_first(configurations)
-    yield from side_by_side([simulate_all([*training[one.name], *validation[one.name]]) for one in ordered], AT_ONCE)
-    return TrainingSet(list(chain(*training.values())), list(chain(*validation.values())))
-
-
-def most_rays_first(configurations: Iterable[SensorConfiguration]) -> list[SensorConfiguration]:
-    """Return configurations in descending number of rays, so that no core is left with a long one at the end."""
-
-    def rays(configuration: SensorConfiguration) -> int:
-        return sum(sensor.model.channels * sensor.model.azimuth_count for sensor in configuration.sensors)
-
-    return sorted(configurations, key=rays, reverse=True)
+    training, validation = (
+        [samples(one, runs) for one in configurations] for runs in (traffic.training, traffic.validation)
+    )
+    works = [simulate_all([*some, *others]) for some, others in zip(training, validation, strict=True)]
+    yield from side_by_side(works, AT_ONCE)
+    return list(chain(*training)), list(chain(*validation))
 
 
 def recorded(simulator: Simulator, configuration: MountedSensors, run: SampledRun) -> Recording:
@@ -265,8 +252,7 @@ def train_all(  # noqa: PLR0913  # what a training depends on
     """
     trainings = [
         train(
-            training_set.training,
-            training_set.validation,
+            *training_set,
             network,
             replace(training, seed=seed),
             device=device,
@@ -299,16 +285,14 @@ def evaluate_all(
     threads : int
         CPU threads of torch; their number affects the exact result.
     """
-    ordered, runs = most_rays_first(configurations), (*traffic.validation, *traffic.test)
-    detectors = [one.detector for one in trained]
-    detections = [detect_in_runs(simulator, one, runs, detectors, threads) for one in ordered]
+    runs, detectors = (*traffic.validation, *traffic.test), [one.detector for one in trained]
+    detections = [detect_in_runs(simulator, one, runs, detectors, threads) for one in configurations]
     with deterministic(threads):  # around all detections, as torch has one setting for all threads
         results = yield from side_by_side(detections, AT_ONCE)
-    by_name = {one.name: frames for one, frames in zip(ordered, results, strict=True)}
     validated = sum(len(run.times) for run in traffic.validation)
     outcomes = []
     for number, detector in enumerate(trained):
-        frames = [by_name[one.name][number] for one in configurations]
+        frames = [by_detector[number] for by_detector in results]
         # one score for each detector, whatever the sensors
         score = balanced_score(evaluate(list(chain(*(some[:validated] for some in frames))), MAIN_RULE))
         for configuration, some in zip(configurations, frames, strict=True):
