@@ -15,7 +15,6 @@ from headless.studies.stability.charts import save_convergence_chart, save_delta
 from headless.studies.stability.criterion import criterion_rows, criterion_study
 from headless.studies.stability.page import Chapter, save_page
 from headless.studies.stability.robustness_rows import pose_rows, robust_rows, traffic_rows
-from headless.studies.stability.weather import COUNT, SENSOR, weather_rows, weather_study
 from headless.studies.survey_options import study_parser
 
 from seip_addon.core.base.progress import Progress
@@ -108,7 +107,6 @@ def main(argv: list[str], scope: StabilityScope | None = None) -> None:
     scene = StudiedScene(surveyed, runs, charts, scope or StabilityScope())
     studies: dict[str, Work] = {"criterion": criterion, "poses": poses, "failures": failures}
     studies |= {"traffic": traffic} if len(runs) > 1 else {}
-    studies |= {"weather": weather}
     chapters = []
     for name, study in studies.items():
         chapters.append(watch.run(name, study(scene)))
@@ -191,12 +189,6 @@ def traffic(scene: StudiedScene) -> Generator[Progress, None, Chapter]:
             "promise.png": "Coverage of placements on the empty road and, on average over time, in traffic",
         },
     )
-
-
-def weather(scene: StudiedScene) -> Generator[Progress, None, Chapter]:
-    """Study a fleet in rain and fog."""
-    answers = yield from weather_study(scene.survey.geometry, scene.survey.settings)
-    return Chapter(f"Weather: {COUNT} × {SENSOR}", weather_rows(answers), {})
 
 
 def _robust(scene: StudiedScene, risks: Sequence[Risk]) -> Generator[Progress, None, tuple[Comparison, ...]]:
