@@ -8,13 +8,11 @@ import importlib.metadata
 import logging
 import os
 from dataclasses import dataclass, field, replace
-from functools import partial
 from pathlib import Path
 
 from headless import runtime
 from headless.studies.benchmark.placement import METHODS, SolverRun, compare
 from headless.studies.benchmark.report import Findings, requirements, save_page
-from headless.studies.benchmark.resource_usage import in_fresh_process
 from headless.studies.benchmark.scans import scan_costs
 from headless.studies.benchmark.street_visibility import street_problem
 from headless.studies.benchmark.visibility import sampled_positions, visibility_costs
@@ -96,9 +94,13 @@ def measure(geometry: SceneGeometry, scope: BenchmarkScope) -> Findings:
     settings = VisibilitySettings()
     models = find_models(load_catalogue(), scope.layout.sensors)
     site = make_site(geometry, scope.layout, fields_of_view=fields_of_view(models))
+    # First: a requirement limits its memory, and memory of earlier work would hide a part.
+    positions, targets, blocks = scope.largest
+    street = street_problem(positions, targets, blocks=blocks, count=scope.counts[-1])
+    largest = compare(_street_name(scope.largest, scope.counts[-1]), street, LARGEST_METHODS, 2 * scope.effort)
     LOG.info(f"{site.name}: full and lazy scans from {scope.positions} positions")
     visibility = visibility_costs(site, models, settings, scope.positions)
-    runs = placement_runs(geometry, settings, scope)
+    runs = [*placement_runs(geometry, settings, scope), *largest]
     LOG.info("scans of traffic")
     scans = scan_costs(site, static_scene(geometry), load_catalogue()[scope.scanned_by], scope.frames)
     setting = {
@@ -117,7 +119,7 @@ def measure(geometry: SceneGeometry, scope: BenchmarkScope) -> Findings:
 
 
 def placement_runs(geometry: SceneGeometry, settings: VisibilitySettings, scope: BenchmarkScope) -> list[SolverRun]:
-    """Compare placement methods for the scene's first type, in street grids, and in the largest street grid."""
+    """Compare placement methods for the scene's first type, and in street grids."""
     first = scope.layout.sensors[0]
     models = find_models(load_catalogue(), [first])
     layout = replace(scope.layout, sensors=(first,))
@@ -130,11 +132,6 @@ def placement_runs(geometry: SceneGeometry, settings: VisibilitySettings, scope:
         positions, targets, blocks = scope.street
         street = street_problem(positions, targets, blocks=blocks, count=count)
         runs += compare(_street_name(scope.street, count), street, list(METHODS), scope.effort)
-    positions, targets, blocks = scope.largest
-    street = street_problem(positions, targets, blocks=blocks, count=scope.counts[-1])
-    name = _street_name(scope.largest, scope.counts[-1])
-    # in a process of its own: a requirement limits its memory, and memory of earlier work would hide a part
-    runs += in_fresh_process(partial(compare, name, street, LARGEST_METHODS, 2 * scope.effort))
     for run in runs:
         seconds = f"{run.expense.cpu:>8.2f} s of CPU"
         LOG.info(f"{run.instance}: {run.method:<13}{run.objective:>10.0f} ≤ {run.bound:<10.1f}{seconds}")
