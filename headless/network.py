@@ -57,8 +57,6 @@ _MOST_BYTES = 1 << 26
 def main(argv: list[str]) -> None:
     """Choose the sites, allocate the budget, and write the network."""
     options = _parser().parse_args(argv)
-    if (options.coverage is None) == (options.budget is None):
-        raise SeipError("give either --budget, or --coverage, to be reached at every site")
     if options.installed_cost is None:
         options.installed_cost = DEFAULTS
     settings = survey.read_survey_settings(options)
@@ -67,9 +65,8 @@ def main(argv: list[str]) -> None:
     runtime.check_folder(options.output)
     places, name = _places(options)
     request = NetworkRequest(
-        budget=options.budget or 0.0,
+        budget=options.budget,
         tolerance=options.gap,
-        coverage=options.coverage,
         approaches=options.approaches,
         settings=settings,
         objective=objective,
@@ -220,12 +217,8 @@ def _parser() -> argparse.ArgumentParser:
         help="length of the approaches of each junction, metres",
     )
     money = parser.add_argument_group("money")
-    money.add_argument("--budget", type=real_number(PRICE), metavar="USD", help="money for all sites together")
     money.add_argument(
-        "--coverage",
-        type=real_number(SHARE),
-        metavar="SHARE",
-        help="share of the road to see at every site at the least price, in place of a budget",
+        "--budget", type=real_number(PRICE), required=True, metavar="USD", help="money for all sites together"
     )
     money.add_argument(
         "--count",

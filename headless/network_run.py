@@ -27,7 +27,6 @@ import numpy as np
 from seip_addon.core.base.arrays import Float
 from seip_addon.core.base.errors import SeipError
 from seip_addon.core.base.progress import Progress
-from seip_addon.core.choosing.network import network_search
 from seip_addon.core.choosing.network.frontier import Frontier, SolvedBudget
 from seip_addon.core.choosing.network.network_search import NetworkAllocation, Request, search_allocation
 from seip_addon.core.choosing.network.site_problem import SiteProblem
@@ -57,15 +56,12 @@ class NetworkRequest:
     budget : float, dollars
     tolerance : float
         Gap at which the search ends, as a share of the value.
-    coverage : float, optional
-        Share of the road to be seen at each site at the least price, in place of the budget.
     objective : Objective
         Criterion and largest number of sensors at each site.
     """
 
     budget: float
     tolerance: float
-    coverage: float | None
     approaches: float
     settings: SurveySettings
     objective: Objective
@@ -131,17 +127,14 @@ def run_network(
     Raises
     ------
     SeipError
-        Every site failed, the coverage cannot be reached, or a file cannot be written.
+        Every site failed, or a file cannot be written.
     """
     sites = yield from _surveyed(places, source, request, workers, folder)
     good = [site for site in sites if not site.message]
     if not good:
         raise SeipError(f"all {len(sites)} sites failed; the first one: {sites[0].place.name}: {sites[0].message}")
     network = _Network(good, request, workers)
-    if request.coverage is not None:
-        allocation = yield from network.cheapest()
-    else:
-        allocation = yield from network.allocated()
+    allocation = yield from network.allocated()
     yield from _placed(good, allocation.taken, request, workers)
     rows = network.rows(allocation)
     numbers = {id(site): row for site, row in zip(good, rows, strict=True)}
@@ -159,8 +152,6 @@ def run_network(
         sensor_names={key: model.name for key, model in request.settings.models().items()},
         attribution=tuple(sorted({credit for site in good for credit in site.attribution})),
         notes=(OWN_SITE,),
-        goal=request.coverage,
-        least_usd=network.least,
     )
 
 
@@ -243,37 +234,12 @@ class _Network:
         self._sites, self._request, self._workers = sites, request, workers
         self.weights: Float = np.array([site.place.weight for site in sites])
         self.criterion = sites[0].problem().criterion
-        self.least = 0.0
 
     def allocated(self) -> Generator[Progress, None, NetworkAllocation]:
         """Allocate the budget."""
         budget, tolerance = self._request.budget, self._request.tolerance
         frontiers = [site.problem().frontier(budget) for site in self._sites]
         return (yield from search_allocation(frontiers, self.weights, budget, tolerance, self._solve, gap=self._gap))
-
-    def cheapest(self) -> Generator[Progress, None, NetworkAllocation]:
-        """Find the cheapest placement of a coverage at each site."""
-        request = self._request
-        results: dict[int, tuple[SolvedBudget, float]] = {}
-        jobs = [
-            lambda site=site: SolveJob(
-                (site.folder / PROBLEM).read_bytes(), 0.0, network_search.LAST_EFFORT, request.coverage
-            )
-            for site in self._sites
-        ]
-        for number, result in run_jobs(self._workers, solve_budget, jobs):
-            if isinstance(result, Failure):
-                raise SeipError(f"{self._sites[number].place.name}: {result.message}")
-            results[number] = result
-            yield Progress(len(results), len(jobs), "cheapest placements")
-        taken = [results[number][0] for number in range(len(jobs))]
-        price = sum(one.price for one in taken)
-        self.least = sum(results[number][1] for number in range(len(jobs)))
-        value = float(self.weights @ [one.value for one in taken])
-        frontiers = tuple(
-            site.problem().frontier(price).with_solved(one) for site, one in zip(self._sites, taken, strict=True)
-        )
-        return NetworkAllocation(price, tuple(taken), price, value, value, frontiers)
 
     def rows(self, allocation: NetworkAllocation) -> list[NetworkSite]:
         """Return the sites of the record."""
@@ -329,8 +295,8 @@ class _Network:
             site = self._sites[requests[number].site]
             if isinstance(result, Failure):
                 raise SeipError(f"{site.place.name}: {result.message}")
-            results[number] = result[0]
-            site.store(result[0])
+            results[number] = result
+            site.store(result)
             yield Progress(done, len(jobs), "searching placements for amounts of money", counted=False)
         return [one for one in results if one is not None]
 

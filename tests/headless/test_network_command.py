@@ -103,8 +103,6 @@ def test_budget_goes_to_the_heavier_site_and_an_interrupted_run_resumes_beside_a
 @pytest.mark.parametrize(
     ("options", "fault"),
     [
-        ((), "give either --budget"),
-        (("--budget", "1000", "--coverage", "0.5"), "give either --budget"),
         (("--budget", "1000", "--junctions", "signals"), "choose junctions of an extract"),
         (("--budget", "1000", "--sensor", "os1_129"), "os1_129"),
     ],

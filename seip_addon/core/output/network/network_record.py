@@ -95,10 +95,6 @@ class NetworkRecord:
         Types to choose from, by their keys in the catalogue; ``sensor_names`` has the products.
     created : str
         Time of the placement (ISO 8601), "" if it is not recorded.
-    goal : float, optional
-        Share of the road to be seen at every site at the least price; the budget is then the price.
-    least_usd : float, dollars
-        Proven bound: nothing cheaper reaches the goal.
     """
 
     name: str
@@ -113,8 +109,6 @@ class NetworkRecord:
     attribution: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     created: str = ""
-    goal: float | None = None
-    least_usd: float = 0.0
 
     @property
     def gap(self) -> float:
@@ -125,23 +119,12 @@ class NetworkRecord:
     def certificate(self) -> str:
         """Certificate as a sentence."""
         money = f"${self.budget_usd:,.0f}"
-        if self.goal is not None:
-            whole = f"{100 * self.goal:g}% of the road at every site"
-            if self.least_usd >= self.price_usd * (1.0 - PROVEN):
-                return f"Proven: nothing cheaper among these sites and candidates sees {whole}."
-            least, saving = math.floor(self.least_usd + 1e-6), math.ceil(1e4 * self.saving - 1e-6) / 100
-            return f"Nothing for less than ${least:,} sees {whole}: at most {saving:.2f}% can be saved."
         use = f"Proven: no other use of {money} among these sites and candidates"
         if self.criterion == "road":
             most = "" if self.gap <= PROVEN else f" than {math.ceil(self.bound * 1000 - 1e-6) / 10:.1f}%"
             return f"{use} sees more{most} of the road."
         most = "" if self.gap <= PROVEN else f" than {math.ceil(10 * math.expm1(self.bound) - 1e-6) / 10:,.1f}"
         return f"{use} has more{most} returns from a typical road user."
-
-    @property
-    def saving(self) -> float:
-        """Largest possible share of the price that a cheaper network with the same goal saves."""
-        return max(0.0, 1.0 - self.least_usd / self.price_usd) if self.price_usd > 0 else 0.0
 
 
 def network_gap(criterion: Literal["road", "returns"], value: float, bound: float) -> float:
