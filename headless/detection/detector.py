@@ -8,7 +8,8 @@ import pickle
 import struct
 import sys
 import threading
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any
@@ -126,14 +127,7 @@ class Detector(nn.Module):
         weights = {
             name: value.half() if half and value.ndim > 1 else value for name, value in self.state_dict().items()
         }
-        # In memory first: torch.save writes the name of a file into its bytes, and leaves it open if the disk is full.
-        content = io.BytesIO()
-        # pickle writes an object that occurs twice only once. Interning makes equal texts one object, so that the bytes
-        # depend on the values and not on how the texts were made.
-        state = {"schema": SCHEMA, "version": VERSION, **self.description(), "weights": weights}
-        torch.save(_interned(state), content)
-        with whole_file(path) as temporary:
-            temporary.write_bytes(content.getvalue())
+        save_state(path, {**self.description(), "weights": weights})
 
     def description(self) -> dict[str, Any]:
         """Return the settings and the training record as plain values."""
@@ -144,34 +138,23 @@ class Detector(nn.Module):
 
     @classmethod
     def load(cls, path: str | os.PathLike[str], device: str = "cpu") -> Detector:
-        """Read a detector from its file.
+        """Read a detector from its file, or from the file of an unfinished training.
 
         Raises
         ------
         SeipError
             The file cannot be read, is damaged, is not a detector, or has a different version.
         """
-        if not Path(path).is_file():
-            raise SeipError(f"detector {path} cannot be read: check its path")
-        try:
-            state = torch.load(path, map_location="cpu", weights_only=True)
-            if (state["schema"], state["version"]) == (SCHEMA, VERSION):
-                return cls._of_state(state).to(device).eval()
-        except SeipError as error:
-            raise SeipError(f"{path} is not a detector file, or is damaged ({error}): train it again") from error
-        except _READ_ERRORS as error:
-            raise SeipError(f"{path} is not a detector file, or is damaged: train it again") from error
-        raise SeipError(f"{path} is not a detector of this version of the program: train it again")
-
-    @classmethod
-    def _of_state(cls, state: Mapping[str, Any]) -> Detector:
-        known = {**state["settings"], "blocks": tuple(state["settings"]["blocks"])}
-        for name in ("head", "padded"):  # in files of earlier versions, which had other networks
-            known.pop(name, None)
-        experience = {name: tuple(names) for name, names in state["experience"].items()}
-        detector = cls(NetworkSettings(**known), training_record=TrainingRecord(**experience))
-        detector.load_state_dict(state["weights"])
-        return detector
+        state = load_state(path)
+        with reading_detector(path):
+            known = dict(state["settings"])
+            if known.pop("head", "centre") != "centre":  # files of earlier versions name one of two heads
+                raise SeipError("it has anchors, which are no longer supported")
+            settings = NetworkSettings(**{**known, "blocks": tuple(known["blocks"])})
+            experience = {name: tuple(names) for name, names in state["experience"].items()}
+            detector = cls(settings, training_record=TrainingRecord(**experience))
+            detector.load_state_dict(state["weights"])
+        return detector.to(device).eval()
 
 
 def has_bfloat16(device: torch.device) -> bool:
@@ -193,6 +176,46 @@ def check_device(device: str) -> None:
         torch.zeros(1, device=device)
     except (RuntimeError, AssertionError) as error:
         raise SeipError(f"PyTorch cannot use the device {device!r}: choose cpu, or repair its driver") from error
+
+
+def save_state(path: str | os.PathLike[str], state: Mapping[str, Any]) -> None:
+    """Write plain values and tensors; equal values give equal bytes."""
+    # In memory first: torch.save writes the name of a file into its bytes, and leaves it open if the disk is full.
+    content = io.BytesIO()
+    # pickle writes an object that occurs twice only once. Interning makes equal texts one object, so that the bytes
+    # depend on the values and not on how the texts were made.
+    torch.save(_interned({"schema": SCHEMA, "version": VERSION, **state}), content)
+    with whole_file(path) as temporary:
+        temporary.write_bytes(content.getvalue())
+
+
+def load_state(path: str | os.PathLike[str]) -> dict[str, Any]:
+    """Read a file of `save_state`, with tensors on the CPU.
+
+    Raises
+    ------
+    SeipError
+        The file cannot be read, is damaged, is not a detector, or has a different version.
+    """
+    if not Path(path).is_file():
+        raise SeipError(f"detector {path} cannot be read: check its path")
+    with reading_detector(path):
+        state: dict[str, Any] = torch.load(path, map_location="cpu", weights_only=True)
+        known = (state["schema"], state["version"]) == (SCHEMA, VERSION)
+    if not known:
+        raise SeipError(f"{path} is not a detector of this version of the program: train it again")
+    return state
+
+
+@contextmanager
+def reading_detector(path: str | os.PathLike[str]) -> Iterator[None]:
+    """Report errors raised in the block as a damaged detector file."""
+    try:
+        yield
+    except SeipError as error:
+        raise SeipError(f"{path} is not a detector file, or is damaged ({error}): train it again") from error
+    except _READ_ERRORS as error:
+        raise SeipError(f"{path} is not a detector file, or is damaged: train it again") from error
 
 
 def _interned(value: Any) -> Any:  # noqa: ANN401  # plain values of any kind

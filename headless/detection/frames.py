@@ -1,13 +1,15 @@
-"""Frames of runs as training samples."""
+"""Frames of runs as training samples, and the check that splits are independent."""
 
 import functools
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import combinations, product
 
 import numpy as np
 from numpy.typing import NDArray
 
 from seip_addon.core.base.arrays import Float, Integer
+from seip_addon.core.base.errors import SeipError
 from seip_addon.core.sensing.scans.frame import Frame
 
 from .detection_area import DetectionArea
@@ -24,18 +26,24 @@ class Recording:
     ----------
     name : str
         For messages.
+    traffic : str
+        Identifier of the run of traffic: the source of its trajectories, with its seed.
     frames : sequence of Frame
         Frames in memory, or simulated on access.
     sensors : tuple of str
         Catalogue keys of the sensors' types, where they are known.
     site : str
         The scene's name, where it is known.
+    placement : str
+        Identifier of the sensors' poses.
     """
 
     name: str
+    traffic: str
     frames: Sequence[Frame]
     sensors: tuple[str, ...] = ()
     site: str = ""
+    placement: str = ""
 
 
 class LazyFrames(Sequence[Frame]):
@@ -141,3 +149,25 @@ def training_record_of(recordings: Sequence[Recording]) -> TrainingRecord:
         sensors=tuple(sorted({sensor for recording in recordings for sensor in recording.sensors})),
         sites=tuple(sorted({recording.site for recording in recordings} - {""})),
     )
+
+
+def require_separate(splits: Mapping[str, Sequence[Recording]]) -> None:
+    """Raise SeipError where a run is in two splits: its frames show the same vehicles in the same places.
+
+    Parameters
+    ----------
+    splits : mapping of str to sequence of Recording
+        What the splits are for, and their recordings.
+
+    Raises
+    ------
+    SeipError
+        One is.
+    """
+    for (one, these), (other, those) in combinations(splits.items(), 2):
+        for a, b in product(these, those):
+            if a.traffic == b.traffic:
+                raise SeipError(
+                    f"{a.name} ({one}) and {b.name} ({other}) show the same run of traffic: "
+                    "a detector must be tested on traffic that it has not seen, so simulate another run for one of them"
+                )

@@ -24,10 +24,13 @@ class PillarEncoder(nn.Module):
     ----------
     width : int
         Channels of a pillar.
+    padded_to : int
+        Points that each pillar with points is filled up to with zeros; 0 for none.
     """
 
-    def __init__(self, width: int) -> None:
+    def __init__(self, width: int, padded_to: int = 0) -> None:
         super().__init__()
+        self.padded_to = padded_to
         self.linear = nn.Linear(POINT_FEATURES, width, bias=False)
         self.normalisation = nn.BatchNorm1d(width, NORMALISATION_EPSILON, NORMALISATION_MOMENTUM)
 
@@ -43,6 +46,11 @@ class PillarEncoder(nn.Module):
         empty = features.new_zeros((count, self.linear.out_features))
         if len(features) < 2:  # nothing to normalise over while training, and one point is no object
             return empty
+        if self.padded_to:
+            met, places = torch.unique_consecutive(pillar, return_counts=True)
+            empty_places = met.repeat_interleave((self.padded_to - places).clamp(min=0))
+            pillar = torch.cat((pillar, empty_places))
+            features = torch.cat((features, features.new_zeros((len(empty_places), POINT_FEATURES))))
         points = torch.relu(self.normalisation(self.linear(features)))
         # After ReLU nothing is below the zero that empty pillars hold.
         return empty.scatter_reduce(0, pillar[:, None].expand_as(points), points, "amax")
@@ -83,7 +91,7 @@ class FeatureMap(nn.Module):
 
     def __init__(self, settings: NetworkSettings) -> None:
         super().__init__()
-        self.encoder = PillarEncoder(settings.width)
+        self.encoder = PillarEncoder(settings.width, settings.most_points if settings.padded else 0)
         self.backbone = Backbone(settings.width, settings.blocks)
 
     @property

@@ -141,6 +141,11 @@ class Simulator:
         return finish(prepare(self.static, configuration.sensors, run.trajectories, bodies, self.settings))
 
 
+def poses_key(configuration: MountedSensors) -> str:
+    """Return a digest of the sensors' types and poses."""
+    return digest(*(part for one in configuration.sensors for part in (one.model.key, one.xyz, one.orientation)))
+
+
 def frames_key(simulator: Simulator, configuration: MountedSensors, runs: Sequence[SampledRun]) -> str:
     """Return a digest of all inputs that determine the frames of runs."""
     scans = (

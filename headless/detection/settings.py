@@ -43,6 +43,8 @@ class NetworkSettings:
         Channels of the pillar features and of the first block, doubled in the second and in the third.
     blocks : tuple of three int
         Convolutions of each block after the one with stride 2.
+    padded : bool
+        Whether pillars are filled up with zero points that are not masked: an ablation.
 
     Examples
     --------
@@ -61,6 +63,7 @@ class NetworkSettings:
     most_points: int = 16
     width: int = 40
     blocks: tuple[int, int, int] = (2, 3, 3)
+    padded: bool = False
 
     def __post_init__(self) -> None:
         rules = {
@@ -70,6 +73,7 @@ class NetworkSettings:
             "there must be three blocks of 0 to 20 convolutions": (
                 len(self.blocks) == 3 and all(_is_integer(count, 0, 20) for count in self.blocks)
             ),
+            "padded must be true or false": isinstance(self.padded, bool),
         }
         for rule, holds in rules.items():
             if not holds:
@@ -96,7 +100,7 @@ class TrainingSettings:
     least_points : int
         Road users with fewer returns are ignored in loss and validation, neither required nor false positives.
     validate_every : int
-        Steps between validations.
+        Steps between validations; each also stores a checkpoint.
     patience : int
         Validations without improvement before training stops.
     seed : int

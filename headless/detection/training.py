@@ -1,7 +1,7 @@
 """Training of a detector on many configurations of sensors at once.
 
 Every step takes windows about road users, each from a configuration, a frame and a place drawn by the seed and the
-number of the step.
+number of the step: a training that was stopped goes on as if it had not been.
 """
 
 from __future__ import annotations
@@ -12,7 +12,8 @@ import os
 import threading
 from collections.abc import Generator, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -22,13 +23,14 @@ from torch.utils.data import DataLoader, Dataset
 
 from seip_addon.core.base.errors import SeipError
 from seip_addon.core.base.progress import Progress
+from seip_addon.core.storage.source_digest import source_digest
 
 from .average_precision import evaluate
 from .centre_head import TrainingTargets
 from .detection_area import DetectionArea
-from .detector import Detector
+from .detector import Detector, load_state, reading_detector, save_state
 from .frame_results import EvaluatedBoxes, FrameResult, GroundTruth
-from .frames import SampledRecording, TrainingSample, drawn, spread, training_record_of
+from .frames import SampledRecording, TrainingSample, drawn, require_separate, spread, training_record_of
 from .inference import detect_on_level
 from .matching import Rule
 from .pillars import PillarGrid, Pillars, fill_pillars, grid_over, stacked
@@ -80,13 +82,14 @@ class TrainedDetector:
     curve: LearningCurve
 
 
-def train(  # data, settings, device and initial weights
+def train(  # noqa: PLR0913  # data, settings, device and initial weights
     recordings: Sequence[SampledRecording],
     validation: Sequence[SampledRecording],
     network: NetworkSettings,
     settings: TrainingSettings,
     *,
     device: str = "cpu",
+    store: str | os.PathLike[str] | None = None,
     start: Detector | None = None,
 ) -> Generator[Progress, None, TrainedDetector]:
     """Train a PointPillars detector until its precision on recordings set aside stops growing.
@@ -97,6 +100,8 @@ def train(  # data, settings, device and initial weights
         Training and validation recordings, of one site or of several, from separate runs of traffic.
     device : str
         PyTorch device: ``cpu``, ``cuda``.
+    store : path, optional
+        Checkpoint: written at each validation; training resumes from it if it exists.
     start : Detector, optional
         Whose weights the training begins with, in place of random ones.
 
@@ -113,9 +118,13 @@ def train(  # data, settings, device and initial weights
     Raises
     ------
     SeipError
-        There is no frame.
+        Runs overlap, there is no frame, or ``store`` holds another training, or one of another version.
     """
+    splits = {"training": recordings, "validation": validation}
+    require_separate({what: [sampled.recording for sampled in some] for what, some in splits.items()})
     run = _Run(recordings, validation, network, settings, device, start)
+    if store is not None and Path(store).exists():
+        run.restore(store)
     yield run.progress()
     batches = run.batches()
     while not run.done:
@@ -123,6 +132,8 @@ def train(  # data, settings, device and initial weights
             run.advance(next(batches))
             if run.step % settings.validate_every == 0 or run.step == settings.steps:
                 run.validate()
+                if store is not None:
+                    run.store(store)
         yield run.progress()
     return run.result()
 
@@ -145,6 +156,7 @@ class _Run:
         if start is not None:
             training_record = training_record.merged_with(start.training_record)
         self.detector = Detector(network, settings.seed, training_record).to(device)
+        self.start = "" if start is None else start.key
         if start is not None:
             self.detector.load_state_dict(start.state_dict())
         self.optimiser = torch.optim.AdamW(
@@ -170,13 +182,13 @@ class _Run:
         return self.step >= self.settings.steps or waited >= self.settings.patience
 
     def batches(self) -> Iterator[_Batch]:
-        """Return the batches of all steps; other processes make them ahead for a GPU."""
+        """Return the batches of the remaining steps; other processes make them ahead for a GPU."""
         # Forked processes share the samples, which others would copy; Windows has none.
         forks = self.detector.device.type == "cuda" and "fork" in multiprocessing.get_all_start_methods()
         loader: DataLoader[_Batch] = DataLoader(
             _Batches(self),
             batch_size=None,
-            sampler=range(self.settings.steps),
+            sampler=range(self.step, self.settings.steps),
             num_workers=max(1, (os.cpu_count() or 1) - 1) if forks else 0,
             multiprocessing_context="fork" if forks else None,
             generator=torch.Generator(),  # else the loader draws from the generator of the whole process
@@ -223,6 +235,59 @@ class _Run:
         self.detector.load_state_dict(self.best)
         return TrainedDetector(self.detector.eval(), self.curve)
 
+    def store(self, path: str | os.PathLike[str]) -> None:
+        """Write all that is needed to go on, and the best weights so far as those of a detector."""
+        # The best weights are stored like those of a detector, so that the file can be loaded as one at any time; the
+        # latest weights, with the state of the optimiser, are for resuming.
+        save_state(
+            path,
+            {
+                **self.detector.description(),
+                "weights": _copied(self.best),
+                "training": {
+                    "settings": asdict(self.settings),
+                    "recordings": self._sources(),
+                    "start": self.start,
+                    "program": source_digest("headless.detection"),
+                    "step": self.step,
+                    "curve": asdict(self.curve),
+                    "weights": _copied(self.detector.state_dict()),
+                    "optimiser": self.optimiser.state_dict(),
+                    "schedule": self.schedule.state_dict(),
+                },
+            },
+        )
+
+    def restore(self, path: str | os.PathLike[str]) -> None:
+        """Continue from a stored training."""
+        state = load_state(path)
+        earlier = state.get("training", {})
+        same = (
+            all(state.get(name) == self.detector.description()[name] for name in ("settings", "experience"))
+            and isinstance(earlier, dict)
+            and earlier.get("settings") == asdict(self.settings)
+            and earlier.get("recordings") == self._sources()
+            and earlier.get("start") == self.start
+            and earlier.get("program") == source_digest("headless.detection")
+        )
+        if not same:
+            raise SeipError(
+                f"{path} is of a training with other settings or recordings, or of another version of the program: "
+                "delete it, or choose another file"
+            )
+        with reading_detector(path):
+            self.step = int(earlier["step"])
+            self.curve = LearningCurve(**earlier["curve"])
+            self.best = state["weights"]
+            self.detector.load_state_dict(earlier["weights"])
+            self.optimiser.load_state_dict(earlier["optimiser"])
+            self.schedule.load_state_dict(earlier["schedule"])
+
+    def _sources(self) -> list[list[str | int]]:
+        both = (*self.training_set, *self.aside)
+        recordings = [(sampled.recording, len(sampled)) for sampled in both]
+        return [[one.name, one.traffic, one.placement, count] for one, count in recordings]
+
 
 _Batch = tuple[Pillars, dict[str, Tensor]]  # pillars of the windows of a step, and their training targets
 
@@ -239,7 +304,8 @@ class _Batches(Dataset[_Batch]):
         return self._settings.steps
 
     def __getitem__(self, step: int) -> _Batch:
-        # A generator for each step, not one for the training: processes that make batches side by side draw the same.
+        # A generator for each step, not one for the training: a resumed training draws the same samples as one that was
+        # not interrupted, without storing the generator's state, and so do processes that make batches side by side.
         random = np.random.default_rng([self._settings.seed, 1, step])
         samples = [drawn(self._recordings, random) for _ in range(self._settings.batch)]
         varied = [vary(sample, self._grid, random, self._settings.least_points) for sample in samples]

@@ -1,6 +1,6 @@
 """What a detector's file holds is checked once, where it is read."""
 
-from headless.detection.detector import Detector, TrainingRecord
+from headless.detection.detector import Detector, TrainingRecord, save_state
 from headless.detection.settings import NetworkSettings
 
 import pytest
@@ -22,7 +22,7 @@ def written(path, change):
     """Change a file's content."""
     state = torch.load(path, weights_only=True)
     change(state)
-    torch.save(state, path)
+    save_state(path, state)
     return path
 
 

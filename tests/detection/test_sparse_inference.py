@@ -66,7 +66,7 @@ def dense_output(detector, pillars) -> torch.Tensor:
     "settings",
     [
         {"blocks": (2, 3, 3)},
-        {"blocks": (0, 1, 2)},
+        {"blocks": (0, 1, 2), "padded": True},
     ],
 )
 def test_near_returns_the_output_is_that_of_dense_convolutions_and_elsewhere_that_of_an_empty_cloud(settings):

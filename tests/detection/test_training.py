@@ -1,4 +1,4 @@
-"""Training: it learns, and it is the same every time."""
+"""Training: it learns, it is the same every time, and it can be stopped."""
 
 import hashlib
 from dataclasses import replace
@@ -6,7 +6,7 @@ from dataclasses import replace
 from headless.detection.average_precision import evaluate
 from headless.detection.detection_area import DetectionArea
 from headless.detection.detector import Detector, TrainingRecord
-from headless.detection.frames import Recording, SampledRecording, sample_of
+from headless.detection.frames import Recording, SampledRecording, require_separate, sample_of
 from headless.detection.inference import detect
 from headless.detection.matching import Rule
 from headless.detection.pillars import grid_over
@@ -28,26 +28,26 @@ GRID = grid_over((-16.0, -16.0, 16.0, 16.0), (-1.0, 4.5), SMALL.pillar)
 AREA = DetectionArea(GRID, HeightRaster(np.full(2, -16.0), 32.0, np.zeros((2, 2))))
 
 
-def sampled(name, frames, network=SMALL):
-    return SampledRecording(Recording(name, frames), AREA, network.most_points)
+def sampled(name, traffic, frames, network=SMALL):
+    return SampledRecording(Recording(name, traffic, frames), AREA, network.most_points)
 
 
-def recording(name, *seeds):
-    return sampled(name, [street_frame(seed) for seed in seeds])
+def recording(name, traffic, *seeds):
+    return sampled(name, traffic, [street_frame(seed) for seed in seeds])
 
 
 @pytest.fixture(scope="module")
 def learning():
-    return [recording("two sensors", 1, 2), recording("the same again", 3)]
+    return [recording("two sensors", "run 1", 1, 2), recording("the same again", "run 1", 3)]
 
 
 @pytest.fixture(scope="module")
 def aside():
-    return [recording("validation", 4)]
+    return [recording("validation", "run 2", 4)]
 
 
-def trained(learning, aside, settings=BRIEF, network=SMALL):
-    return finish(train(learning, aside, network, settings))
+def trained(learning, aside, settings=BRIEF, network=SMALL, store=None):
+    return finish(train(learning, aside, network, settings, store=store))
 
 
 def bytes_of(path):
@@ -56,10 +56,10 @@ def bytes_of(path):
 
 def test_a_frame_can_be_memorised():
     frame = street_frame(11, users=6, kinds=("car",))
-    same = sampled("frame", [frame])
+    same, again = (sampled("frame", traffic, [frame]) for traffic in ("run 1", "run 1 by another name"))
     network = replace(SMALL, width=24)
     settings = replace(BRIEF, steps=300, batch=4, window=25.6, learning_rate=1e-2, validate_every=100)
-    result = trained([same], [same], settings, network)
+    result = trained([same], [again], settings, network)
     found = result_of_sample(result.detector, AREA, sample_of(frame, AREA, network.most_points))
     assert evaluate([found], Rule(iou=0.7)).average_precision == pytest.approx(1.0)
     assert result.curve.loss[-1] < 0.3 * result.curve.loss[0]
@@ -74,16 +74,42 @@ def test_the_same_seed_gives_the_same_bytes(tmp_path, learning, aside):
     assert bytes_of(one) != bytes_of(other)
 
 
-def test_a_training_goes_on_from_another_detector(learning, aside):
+def test_a_training_that_was_stopped_goes_on_as_if_it_had_not_been(tmp_path, learning, aside):
+    whole, broken = tmp_path / "whole.pt", tmp_path / "broken.pt"
+    trained(learning, aside, store=whole)
+    steps = train(learning, aside, SMALL, BRIEF, store=broken)
+    for progress in steps:
+        if progress.done == 4:
+            break
+    steps.close()
+    assert broken.exists()
+    resumed = list(train(learning, aside, SMALL, BRIEF, store=broken))
+    assert resumed[0].done == 3
+    assert bytes_of(whole) == bytes_of(broken)
+    assert len(list(train(learning, aside, SMALL, BRIEF, store=broken))) == 1  # nothing left to do
+
+
+def test_runs_of_traffic_are_in_one_split_alone(learning, aside):
+    splits = {"training": learning, "validation": aside, "test": [recording("leak", "run 1", 7)]}
+    recordings = {what: [each.recording for each in some] for what, some in splits.items()}
+    with pytest.raises(SeipError, match=r"two sensors \(training\) and leak \(test\) show the same run of traffic"):
+        require_separate(recordings)
+    with pytest.raises(SeipError, match="same run of traffic"):
+        next(train(learning, learning, SMALL, BRIEF))
+
+
+def test_a_training_goes_on_from_another_detector(learning, aside, tmp_path):
     record = TrainingRecord(("type9",), ("Elsewhere",))
     start = Detector(SMALL, seed=9, training_record=record)
     once = replace(BRIEF, steps=1, learning_rate=1e-12)
-    begun = finish(train(learning, aside, SMALL, once, start=start)).detector
+    begun = finish(train(learning, aside, SMALL, once, start=start, store=tmp_path / "begun.pt")).detector
     weights = begun.state_dict()
     for name, value in start.named_parameters():
         torch.testing.assert_close(weights[name], value, atol=1e-9, rtol=1e-6)
     assert set(record.sites) <= set(begun.training_record.sites)
     assert set(record.sensors) <= set(begun.training_record.sensors)
+    with pytest.raises(SeipError, match="other settings or recordings"):
+        next(train(learning, aside, SMALL, once, store=tmp_path / "begun.pt"))
 
 
 def test_a_detector_is_read_back_as_it_was(tmp_path, learning, aside):

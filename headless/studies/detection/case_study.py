@@ -16,7 +16,7 @@ from headless.detection.detector import Detector
 from headless.detection.detector_evaluation import AT_ONCE, detect_in_runs, side_by_side
 from headless.detection.frame_results import FrameResult
 from headless.detection.frames import LazyFrames, Recording, SampledRecording
-from headless.detection.recordings import MountedSensors, SampledRun, Simulator, sampled_runs
+from headless.detection.recordings import MountedSensors, SampledRun, Simulator, poses_key, sampled_runs
 from headless.detection.rules import MAIN_RULE
 from headless.detection.settings import NetworkSettings, TrainingSettings
 from headless.detection.training import LearningCurve, TrainedDetector, deterministic, train
@@ -214,7 +214,7 @@ def recorded(simulator: Simulator, configuration: MountedSensors, run: SampledRu
     """Return the frames of a run, simulated on access."""
     frames = LazyFrames(len(run.times), lambda number: simulator.frame(configuration, run, number))
     name = f"{configuration.name} in {run.name}"
-    return Recording(name, frames, configuration.types, simulator.site)
+    return Recording(name, run.key, frames, configuration.types, simulator.site, poses_key(configuration))
 
 
 def simulate_all(recordings: Sequence[SampledRecording]) -> Generator[Progress, None, None]:
@@ -227,10 +227,11 @@ def simulate_all(recordings: Sequence[SampledRecording]) -> Generator[Progress, 
             done += 1
 
 
-def train_all(  # what a training depends on
+def train_all(  # noqa: PLR0913  # what a training depends on
     training_set: TrainingSet,
     network: NetworkSettings,
     training: TrainingSettings,
+    folder: Path,
     *,
     seeds: int,
     device: str,
@@ -240,6 +241,8 @@ def train_all(  # what a training depends on
 
     Parameters
     ----------
+    folder : path
+        Folder for the detectors, ``detector-SEED.pt``; those already there are not trained again.
     seeds : int
         Number of detectors.
     device : str
@@ -253,6 +256,7 @@ def train_all(  # what a training depends on
             network,
             replace(training, seed=seed),
             device=device,
+            store=folder / f"detector-{seed}.pt",
             start=start,
         )
         for seed in range(1, seeds + 1)

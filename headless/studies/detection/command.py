@@ -3,7 +3,7 @@
 seip study detection scenes/junction.blend -o out/evaluation
 blender -b --python-exit-code 1 site.blend -P headless/study.py -- detection --traffic run-*.npz -o out/evaluation
 
-Needs torch (make detection).
+Needs torch (make detection). An evaluation that was stopped resumes.
 """
 
 import argparse
@@ -98,15 +98,14 @@ def run_study(  # noqa: PLR0913  # a site, its placements, and how detectors are
     device: str,
     start: Detector | None = None,
 ) -> StudyResults:
-    """Simulate, train and evaluate detectors for all configurations; trained detectors are written to the folder."""
+    """Simulate, train and evaluate detectors for all configurations; trained detectors stay in the folder."""
     watch, simulator, traffic, network = site.stopwatch, site.simulator, site.traffic, NetworkSettings()
     simulating = case_study.simulate_training_set(simulator, configurations, traffic, network)
     training_set = watch.run("simulation", simulating)
-    learning = case_study.train_all(training_set, network, training, seeds=seeds, device=device, start=start)
+    learning = case_study.train_all(training_set, network, training, folder, seeds=seeds, device=device, start=start)
     trained = watch.run("training", learning)
     for seed, one in enumerate(trained, start=1):
         name = f"detector-{seed}"
-        one.detector.save(folder / f"{name}.pt")
         save_training_chart(folder / f"{name}.png", one.curve.loss, one.curve.validation, name)
     evaluating = case_study.evaluate_all(simulator, configurations, trained, traffic, training.threads)
     outcomes = watch.run("evaluation", evaluating)

@@ -3,8 +3,8 @@
 seip study paper Town05.xodr --junction 965 -o docs
 blender -b --python-exit-code 1 -P headless/study.py -- paper Town05.xodr --junction 965 -o docs
 
-Needs torch (make detection), and SUMO (make sumo) unless runs of traffic are given. The scene, its
-traffic and the detectors stay in the work folder.
+Needs torch (make detection), and SUMO (make sumo) unless runs of traffic are given. Trained detectors are stored in the
+work folder: rerun the command to resume.
 """
 
 import argparse

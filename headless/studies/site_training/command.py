@@ -5,7 +5,7 @@ seip study site-training out/sites/*/site.blend -o out/detector
 
 The runs of traffic of each scene are in the folder SCENE_traffic next to it. Half of the frames are changed to be as
 recordings are, and pedestrians walk in groups. The last sites are set aside for validation, which decides when
-to stop.
+to stop. Rerun the command to resume an interrupted training.
 """
 
 import argparse
@@ -73,7 +73,8 @@ def main(argv: list[str]) -> None:
         ]
         for scenes in set_aside(list(enumerate(options.scenes)))
     )
-    steps = train(training_recordings, validation, NETWORK, training, device=options.device)
+    store = options.output / "training.pt"
+    steps = train(training_recordings, validation, NETWORK, training, device=options.device, store=store)
     trained = runtime.finish_with_bar(steps)
     best = trained.curve.best
     trained.detector.save(options.output / "detector.pt", half=True)

@@ -55,8 +55,9 @@ def test_the_table_has_a_row_for_each_detector_and_placement(folder):
     assert {row["road_users_pedestrian_0.5"] for row in rows} == {"0"}
 
 
-def test_an_evaluation_again_gives_the_same_bytes(run, folder, tmp_path, capsys):
-    (tmp_path / "visibility.npz").write_bytes((folder / "visibility.npz").read_bytes())
+def test_an_evaluation_goes_on_and_ends_the_same(run, folder, tmp_path, capsys):
+    for name in ("visibility.npz", "detector-1.pt"):
+        (tmp_path / name).write_bytes((folder / name).read_bytes())
     run(tmp_path, "--from-scratch")
     said = capsys.readouterr().out
     assert "vehicles of one run within 1 m of one of another at the same instant: run-1 and run-2 4%, " in said

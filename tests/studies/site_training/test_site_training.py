@@ -7,6 +7,7 @@ import pytest
 pytest.importorskip("torch", reason="torch is not installed: make detection")
 
 from headless.detection.detector import Detector
+from headless.detection.recordings import poses_key
 from headless.detection.settings import NetworkSettings
 from headless.studies.site_training import command as train_on_sites
 from headless.studies.site_training.command import HEIGHTS, MAX_SENSORS, TILTS, candidates_of_types, random_placement
@@ -63,6 +64,10 @@ def test_random_placements_are_of_different_positions_and_all_poses():
         assert len(set(places)) == len(places)
         assert set(places) <= poses
     assert {tuple(sensor.xyz.tolist()) for one in drawn for sensor in one.sensors} == poses
+    again = np.random.default_rng(3)
+    assert [poses_key(one) for one in drawn[:5]] == [
+        poses_key(random_placement("one", candidates, models, again)) for _ in range(5)
+    ]
 
 
 def test_every_type_of_the_catalogue_has_candidates_at_the_same_positions():
