@@ -10,11 +10,10 @@
 # make detection   install PyTorch, for the detector
 # make sumo        install Eclipse SUMO, for extracts and traffic (230 MB)
 # make study       redo the study on the shipped junction: coverage and detection (make -j2 study: ten minutes)
-# make recording   simulate the shipped recording of an installation again
 # make detector    train a detector as the shipped one, at 64 random sites (needs a GPU)
 # make stability   drive every method to where it fails, and write docs/stability.md (an hour)
 # make traffic     simulate the shipped traffic again (installs Eclipse SUMO in the environment: 230 MB)
-# make benchmark   measure speed, accuracy and growth again, and write docs/benchmark.md (20 minutes)
+# make benchmark   measure speed again, and write docs/benchmark.md (15 minutes)
 # make extension   build the Blender extension in dist/
 # make lock        write wheels.lock again, the digests of all pinned packages, after a pin has changed
 # make clean       remove what was built; make distclean removes the environment and the wheels as well
@@ -29,7 +28,7 @@ SPREAD := -n auto --maxprocesses 4
 DEMO := scenes/junction.blend --sensor type1 type2 type3 -o out/junction
 
 .DEFAULT_GOAL := help
-.PHONY: help environment demo site network test test-short test-slow test-long lint scenes sumo traffic detection study coverage-study detection-study recording detector stability benchmark extension lock clean distclean
+.PHONY: help environment demo site network test test-short test-slow test-long lint scenes sumo traffic detection study coverage-study detection-study detector stability benchmark extension lock clean distclean
 
 help:
 	@sed -n '/^#/!q; s/^#\( \|$$\)//p' Makefile
@@ -49,7 +48,7 @@ site: sumo
 
 network: sumo
 	$(PY) -m headless.network scenes/town.osm --junctions all --budget 150_000 --gap 0.05 -o out/town
-	@echo "map: out/town/network.html, report: out/town/report.html, report.pdf"
+	@echo "report: out/town/report.html, report.pdf"
 
 test: environment
 	$(PY) -m pytest $(SPREAD) --ignore tests/studies --ignore tests/detection -m "not slow and not long"
@@ -105,13 +104,6 @@ coverage-study: detection
 
 detection-study: detection
 	$(PY) -m headless study detection scenes/junction.blend -o out/study/detection
-
-# The recording of an installation that differs from its plan, docs/recordings.md.
-recording: detection
-	$(PY) -m headless place scenes/junction.blend --sensor vlp16 --count 1 --heights 5.4 --no-render -o out/recorded
-	cp out/recorded/placed.blend scenes/junction_recording/plan.blend
-	$(PY) -m headless.studies.shipped_recording scenes/junction_recording/plan.blend \
-	  scenes/junction_traffic/run-9.npz scenes/junction_recording/sweeps
 
 detector: detection sumo
 	$(PY) -m headless study random-sites -o out/sites --sites 64 --seed 1

@@ -15,7 +15,6 @@ VERBS = {
     "report": "write a report on a placement, HTML and PDF",
     "traffic": "add traffic to a scene, recorded or simulated by SUMO",
     "simulate": "scan traffic with the sensors of a scene",
-    "train": "train and test a detector",
     "detect": "detect road users in simulated scans or in a recording",
     "verify": "compare installed sensors with their plan, by a recording",
     "study": "run a study of the program's methods",

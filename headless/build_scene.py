@@ -10,9 +10,7 @@ seip build-scene place.osm --near-latlon 51.906 4.456 --terrain dem.tif -o a.ble
 """
 
 import argparse
-import os
 import sys
-from collections.abc import Sequence
 from pathlib import Path
 
 if not __package__:  # run as a file by `blender -P`
@@ -24,41 +22,15 @@ from headless.options import NUMBER, add_settings, new_parser
 from seip_addon.core.base.counts import counted
 from seip_addon.core.base.errors import SeipError
 from seip_addon.core.base.progress import finish
-from seip_addon.core.output.pictures.chart_style import MARKERS, colour, new_figure, save_chart, style_axes
-from seip_addon.core.output.pictures.palette import INK, SOFT_INK
 from seip_addon.core.programs.sumo_programs import NETWORK_SUFFIX
 from seip_addon.core.site.sources import source_lines
 from seip_addon.core.storage.files import locked_file
 from seip_addon.core.workflows.site_building import SiteRequest, build_site, save_map
 from seip_addon.core.world.elevation.at_place import TerrainRequest
-from seip_addon.core.world.elevation.obstacles import MAX_CHANGED, RAYS, Merging, chosen_merging
 from seip_addon.core.world.openstreetmap.map_links import parsed_position
 from seip_addon.core.world.openstreetmap.overpass import OVERPASS, OverpassServer, user_cache
 from seip_addon.scene.blend_file import check_name, new_file, save_blend
 from seip_addon.scene.build import build_scene
-
-
-def save_merging_chart(path: str | os.PathLike[str], tried: Sequence[Merging]) -> None:
-    """Draw the share of changed lines of sight over the number of boxes, one mark for each tolerance.
-
-    Raises
-    ------
-    SeipError
-        The file cannot be written.
-    """
-    figure, (panel,) = new_figure(7.0, 4.2)
-    boxes, changed = [one.boxes for one in tried], [100 * one.changed for one in tried]
-    panel.plot(boxes, changed, color=colour(1), marker=MARKERS[0])
-    chosen = chosen_merging(tried)
-    panel.plot([chosen.boxes], [100 * chosen.changed], MARKERS[0], color=colour(0), markersize=10)
-    panel.axhline(100 * MAX_CHANGED, color=SOFT_INK, linewidth=0.8, linestyle="dashed")
-    for one in tried:
-        place = (one.boxes, 100 * one.changed)
-        panel.annotate(f"{one.tolerance:g} m", place, (6, 6), textcoords="offset points", color=INK, fontsize=9)
-    panel.set_xscale("log")
-    panel.set_ylim(bottom=0)
-    style_axes(panel, "boxes", f"lines of sight that differ, % of {RAYS:,} random ones")
-    save_chart(path, figure, f"Boxes for what the survey has above the ground: {chosen.boxes:,} taken")
 
 
 def main(argv: list[str]) -> None:
@@ -81,10 +53,6 @@ def _build(request: argparse.Namespace) -> None:
         finish(build_scene(scene, model, built.map_name), report)
     save_map(built, map_path)
     save_blend(request.output)
-    if any(one.boxes for one in built.merging):
-        chart = request.output.with_suffix(".boxes.png")
-        save_merging_chart(chart, built.merging)
-        runtime.print_line(f"{chart}: boxes of the survey, and which share of lines of sight they change")
     for note in model.notes:
         runtime.print_line(f"note: {note}")
     runtime.warn(model.warnings)

@@ -9,7 +9,6 @@ ships with the project was trained on random placements at random sites (`seip s
 """
 
 import argparse
-import os
 import sys
 from itertools import combinations
 from pathlib import Path
@@ -22,10 +21,8 @@ from headless.detect_recording import add_recording_options, detect_recording, i
 from headless.detection.average_precision import too_few_runs
 from headless.detection.detector import SHIPPED_DETECTOR, Detector, check_device
 from headless.detection.detector_evaluation import evaluate_detector
-from headless.detection.inference import seconds_of
 from headless.detection.recordings import MountedSensors, Simulator, sampled_runs
 from headless.detection.suitability import suitability_warnings
-from headless.detection.training import deterministic
 from headless.detection_results import (
     print_precision,
     remove_detections,
@@ -79,8 +76,7 @@ def main(argv: list[str]) -> None:
     simulator, placed = Simulator(geometry, scans, sensors), MountedSensors("sensors", tuple(sensors))
     check_runs([run.trajectories for run in runs], simulator.static.region)
     outcome = runtime.finish_with_bar(evaluate_detector(detector, simulator, placed, runs))
-    area = simulator.area(detector.settings.pillar)
-    doubts = suitability_warnings(detector, placed.types, area, outcome.scan)
+    doubts = suitability_warnings(detector, placed.types, geometry.name)
     doubts = (*doubts, *filter(None, [too_few_runs(len(runs))]))
     runtime.warn(doubts)
     precisions = outcome.precisions
@@ -106,11 +102,6 @@ def main(argv: list[str]) -> None:
         }
         save_json(options.output / "detection.json", record)
     print_precision(outcome)
-    cores = os.cpu_count() or 1
-    with deterministic(cores):
-        seconds = seconds_of(detector, area, outcome.scan)
-    where = options.device if options.device != "cpu" else f"{cores} cores"
-    runtime.print_line(f"detection in the fullest frame, {len(outcome.scan):,} returns: {seconds:.2f} s on {where}")
     runtime.print_line(f"written to {options.output}/")
 
 
@@ -138,7 +129,7 @@ def _parser() -> argparse.ArgumentParser:
         type=Path,
         default=SHIPPED_DETECTOR,
         metavar="PT",
-        help="detector of `seip train` or `seip study site-training` (default: the shipped one)",
+        help="detector of `seip study site-training` (default: the shipped one)",
     )
     parser.add_argument(
         "--every", type=real_number(TIME_STEP), default=2.5, metavar="S", help="interval between frames"

@@ -152,7 +152,7 @@ def detect_recording(options: argparse.Namespace, detector: Detector) -> None:
     fullest = max(range(len(results)), key=lambda number: len(results[number].detected))
     scan = frames.frame(fullest)
     doubts = [sentence for name, background in backgrounds for sentence in background.warnings(name)]
-    doubts += suitability_warnings(detector, [one.key for one in sensors.models.values()], area, scan)
+    doubts += suitability_warnings(detector, [one.key for one in sensors.models.values()], site)
     if any(sensor.intensity_scale is None for sensor in frames.sensors):
         doubts.append(
             "the recording has no intensities: all points get the same one, and fewer road users may be found"

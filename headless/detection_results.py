@@ -7,9 +7,9 @@ from dataclasses import replace
 from pathlib import Path
 
 from headless import runtime
-from headless.charts.detection import BinnedFigure, PrecisionRecallLine, save_parts_chart, save_precision_recall_chart
+from headless.charts.detection import BinnedFigure, save_parts_chart, save_precision_recall_chart
 from headless.charts.error_view import ErrorView, save_error_view
-from headless.detection.average_precision import Evaluation, precision_recall
+from headless.detection.average_precision import precision_recall
 from headless.detection.breakdown import DISTANCE_EDGES, POINT_EDGES, average_precision_by, recall_by
 from headless.detection.detector_evaluation import DetectorEvaluation
 from headless.detection.frame_results import Detections, FrameResult
@@ -28,12 +28,6 @@ from seip_addon.core.sensing.scans.sensor import MountedSensor
 from seip_addon.core.storage.files import whole_file
 
 PLAN_COLUMNS = [0, 1, 3, 4, 6]
-
-
-def curve(sensor: str, count: int, evaluation: Evaluation) -> PrecisionRecallLine:
-    """Return precision and recall of one type and number of sensors."""
-    found = precision_recall(evaluation)
-    return PrecisionRecallLine(sensor, count, found.recall, found.precision, evaluation.average_precision)
 
 
 def error_view(  # noqa: PLR0913 - a frame, how it is evaluated, and where it is
@@ -93,19 +87,21 @@ def save_charts(
     evaluation, score = outcome.evaluation, outcome.score
     far = "distance to the nearest sensor (m)"
     panels: list[BinnedFigure] = [
-        (far, "average precision", {name: average_precision_by(evaluation, "distance", DISTANCE_EDGES)}),
-        (far, "recall", {name: recall_by(evaluation, "distance", DISTANCE_EDGES, score)}),
-        ("returns from the road user", "recall", {name: recall_by(evaluation, "points", POINT_EDGES, score)}),
+        (far, "average precision", average_precision_by(evaluation, "distance", DISTANCE_EDGES)),
+        (far, "recall", recall_by(evaluation, "distance", DISTANCE_EDGES, score)),
+        ("returns from the road user", "recall", recall_by(evaluation, "points", POINT_EDGES, score)),
     ]
     save_parts_chart(folder / "where.png", panels, name)
     types = " + ".join(sorted({sensor.model.key for sensor in sensors}))
     count = len(sensors)
-    save_precision_recall_chart(folder / "precision_recall.png", [curve(types, count, evaluation)], name)
+    curve, label = precision_recall(evaluation), f"{count} × {types}: AP {evaluation.average_precision:.2f}"
+    save_precision_recall_chart(folder / "precision_recall.png", curve.recall, curve.precision, label, name)
     frame = outcome.frames[outcome.fullest]
     places = np.array([sensor.xyz for sensor in sensors])
-    title = f"{count} × {types}: AP {evaluation.average_precision:.2f} over all frames"
     cloud = outcome.scan.points
-    view = error_view(title, frame, MAIN_RULE, score=score, cloud=cloud, region=region, sensors=places)
+    view = error_view(
+        f"{label} over all frames", frame, MAIN_RULE, score=score, cloud=cloud, region=region, sensors=places
+    )
     save_error_view(folder / "errors.png", [view], f"{name}, {frame.run} at {frame.time:.1f} s", attribution)
 
 

@@ -10,7 +10,6 @@ import json
 import math
 import os
 import shutil
-import sys
 from collections.abc import Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
@@ -52,20 +51,12 @@ from seip_addon.core.world.openstreetmap.streets import importance, is_street
 MOST_SENSORS = 8
 SECONDS_PER_SITE, MEMORY_PER_WORKER, DISK_PER_SITE = 20.0, 1.5, 6.0
 """Seconds of a worker, GiB and MB for a typical site; the seconds are those of `make network` on two workers."""
-LONG = 7200.0  # seconds from which a run must be confirmed
 _MOST_BYTES = 1 << 26
 
 
 def main(argv: list[str]) -> None:
     """Choose the sites, allocate the budget, and write the network."""
-    parser = _parser()
-    options, rest = parser.parse_known_args(argv)
-    if rest and rest[0].replace("_", "").isdecimal():  # amounts for phases, in earlier versions
-        raise SeipError("--budget takes one amount: networks no longer have phases, so give the whole of it at once")
-    if rest:
-        parser.error(f"unrecognized arguments: {' '.join(rest)}")
-    if (options.coverage is None) == (options.budget is None):
-        raise SeipError("give either --budget, or --coverage, to be reached at every site")
+    options = _parser().parse_args(argv)
     if options.installed_cost is None:
         options.installed_cost = DEFAULTS
     settings = survey.read_survey_settings(options)
@@ -74,9 +65,8 @@ def main(argv: list[str]) -> None:
     runtime.check_folder(options.output)
     places, name = _places(options)
     request = NetworkRequest(
-        budget=options.budget or 0.0,
+        budget=options.budget,
         tolerance=options.gap,
-        coverage=options.coverage,
         approaches=options.approaches,
         settings=settings,
         objective=objective,
@@ -84,7 +74,7 @@ def main(argv: list[str]) -> None:
     if options.scheduler is None:
         _check_sumo(places, options.output)
     number = options.workers or _usual_workers()
-    _confirm(options, len(places), number)
+    _state_needs(options, len(places), number)
     source = _Sources(request)
     try:
         with connected(options.scheduler, number) as client, runtime.progress_bar() as report:
@@ -101,7 +91,7 @@ def main(argv: list[str]) -> None:
     where = f"{len(equipped)} of {counted(len(record.sites), 'site')}"
     runtime.print_line(f"{counted(sensors, 'sensor')} at {where}, ${record.price_usd:,.0f}")
     runtime.print_line(record.certificate)
-    runtime.print_line(f"written to {options.output}/: network.html is the map, report.html the report")
+    runtime.print_line(f"written to {options.output}/: report.html and report.pdf show the result")
 
 
 class _Sources:
@@ -189,8 +179,8 @@ def _usual_workers() -> int:
     return max(1, math.floor(min(cores, _memory() / MEMORY)))
 
 
-def _confirm(options: argparse.Namespace, sites: int, number: int) -> None:
-    """State what a run needs at most; ask before a large one, and refuse it where nobody can answer."""
+def _state_needs(options: argparse.Namespace, sites: int, number: int) -> None:
+    """State what a run needs at most; refuse one for which the disk has no room."""
     disk = sites * DISK_PER_SITE / 1000.0
     free = shutil.disk_usage(options.output).free / 1e9
     if free < disk:
@@ -199,14 +189,7 @@ def _confirm(options: argparse.Namespace, sites: int, number: int) -> None:
     needs = f"about {_duration(seconds)} on {counted(number, 'worker')}, {memory:g} GiB of memory"
     if options.scheduler is not None:
         needs = f"about {_duration(sites * SECONDS_PER_SITE)} of one worker, {MEMORY_PER_WORKER:g} GiB for each worker"
-    needs = f"{counted(sites, 'site')}: {needs} and {disk:.2g} GB on the disk if none is finished"
-    large = seconds > LONG or memory * 2**30 > _memory()
-    asks = large and not options.yes and options.scheduler is None
-    if asks and not (sys.stdin and sys.stdin.isatty()):
-        raise SeipError(f"{needs}: choose fewer sites, or confirm by --yes")
-    runtime.LOG.info(needs)
-    if asks and input("go on? [y/N] ").strip().casefold() not in {"y", "yes"}:
-        raise SeipError("not started: choose fewer sites, or a cluster by --scheduler")
+    runtime.LOG.info(f"{counted(sites, 'site')}: {needs} and {disk:.2g} GB on the disk if none is finished")
 
 
 def _duration(seconds: float) -> str:
@@ -234,12 +217,8 @@ def _parser() -> argparse.ArgumentParser:
         help="length of the approaches of each junction, metres",
     )
     money = parser.add_argument_group("money")
-    money.add_argument("--budget", type=real_number(PRICE), metavar="USD", help="money for all sites together")
     money.add_argument(
-        "--coverage",
-        type=real_number(SHARE),
-        metavar="SHARE",
-        help="share of the road to see at every site at the least price, in place of a budget",
+        "--budget", type=real_number(PRICE), required=True, metavar="USD", help="money for all sites together"
     )
     money.add_argument(
         "--count",
@@ -260,7 +239,6 @@ def _parser() -> argparse.ArgumentParser:
     work = parser.add_argument_group("work")
     work.add_argument("--scheduler", metavar="ADDRESS", help="Dask scheduler: tcp://host:8786 or tls://host:8786")
     work.add_argument("--workers", type=whole_number(Limits(1, 1024)), metavar="N", help="processes on this machine")
-    work.add_argument("--yes", action="store_true", help="start long runs without asking")
     return parser
 
 

@@ -27,13 +27,11 @@ import numpy as np
 from seip_addon.core.base.arrays import Float
 from seip_addon.core.base.errors import SeipError
 from seip_addon.core.base.progress import Progress
-from seip_addon.core.choosing.network import network_search
 from seip_addon.core.choosing.network.frontier import Frontier, SolvedBudget
-from seip_addon.core.choosing.network.network_search import Goal, NetworkAllocation, Request, search_allocations
+from seip_addon.core.choosing.network.network_search import NetworkAllocation, Request, search_allocation
 from seip_addon.core.choosing.network.site_problem import SiteProblem
 from seip_addon.core.choosing.placement.objective import Objective
 from seip_addon.core.output.network.network_record import (
-    NetworkPoint,
     NetworkRecord,
     NetworkSensor,
     NetworkSite,
@@ -46,12 +44,7 @@ from seip_addon.core.workflows.network_sites import NetworkPlace
 from seip_addon.core.workflows.survey_settings import SurveySettings
 
 PROBLEM, SEARCHES = SURVEY_FILES[3], "searches.json"
-CURVE = (0.25, 0.5, 0.75, 1.5, 2.0)
-"""Shares of the money, besides the whole, at which the curve of value against money is computed."""
 OWN_SITE = "each sensor counts for its own site: what it sees of a neighbouring site is left out"
-CURVE_TOLERANCE, CURVE_EFFORT = 0.02, 1.0
-"""Gap up to which the curve is refined, by short searches: long ones for points beyond the budget took longer than the
-search for the budget itself."""
 
 
 @dataclass(frozen=True)
@@ -63,15 +56,12 @@ class NetworkRequest:
     budget : float, dollars
     tolerance : float
         Gap at which the search ends, as a share of the value.
-    coverage : float, optional
-        Share of the road to be seen at each site at the least price, in place of the budget.
     objective : Objective
         Criterion and largest number of sensors at each site.
     """
 
     budget: float
     tolerance: float
-    coverage: float | None
     approaches: float
     settings: SurveySettings
     objective: Objective
@@ -137,18 +127,14 @@ def run_network(
     Raises
     ------
     SeipError
-        Every site failed, the coverage cannot be reached, or a file cannot be written.
+        Every site failed, or a file cannot be written.
     """
     sites = yield from _surveyed(places, source, request, workers, folder)
     good = [site for site in sites if not site.message]
     if not good:
         raise SeipError(f"all {len(sites)} sites failed; the first one: {sites[0].place.name}: {sites[0].message}")
     network = _Network(good, request, workers)
-    if request.coverage is not None:
-        allocation = yield from network.cheapest()
-        curve: tuple[NetworkPoint, ...] = ()
-    else:
-        allocation, curve = yield from network.allocated()
+    allocation = yield from network.allocated()
     yield from _placed(good, allocation.taken, request, workers)
     rows = network.rows(allocation)
     numbers = {id(site): row for site, row in zip(good, rows, strict=True)}
@@ -162,13 +148,10 @@ def run_network(
         value=allocation.value / weight,
         bound=allocation.bound / weight,
         sites=everything,
-        curve=curve,
         sensor_types=request.settings.candidates.sensors,
         sensor_names={key: model.name for key, model in request.settings.models().items()},
         attribution=tuple(sorted({credit for site in good for credit in site.attribution})),
         notes=(OWN_SITE,),
-        goal=request.coverage,
-        least_usd=network.least,
     )
 
 
@@ -251,39 +234,12 @@ class _Network:
         self._sites, self._request, self._workers = sites, request, workers
         self.weights: Float = np.array([site.place.weight for site in sites])
         self.criterion = sites[0].problem().criterion
-        self.least = 0.0
 
-    def allocated(self) -> Generator[Progress, None, tuple[NetworkAllocation, tuple[NetworkPoint, ...]]]:
-        """Allocate the budget; return the allocation with the curve of value against money."""
-        request = self._request
-        frontiers = [site.problem().frontier(CURVE[-1] * request.budget) for site in self._sites]
-        goals = [Goal(request.budget, request.tolerance), *self._curve_goals()]
-        allocation, *others = yield from search_allocations(frontiers, self.weights, goals, self._solve, gap=self._gap)
-        return allocation, self._curve(others)
-
-    def cheapest(self) -> Generator[Progress, None, NetworkAllocation]:
-        """Find the cheapest placement of a coverage at each site."""
-        request = self._request
-        results: dict[int, tuple[SolvedBudget, float]] = {}
-        jobs = [
-            lambda site=site: SolveJob(
-                (site.folder / PROBLEM).read_bytes(), 0.0, network_search.LAST_EFFORT, request.coverage
-            )
-            for site in self._sites
-        ]
-        for number, result in run_jobs(self._workers, solve_budget, jobs):
-            if isinstance(result, Failure):
-                raise SeipError(f"{self._sites[number].place.name}: {result.message}")
-            results[number] = result
-            yield Progress(len(results), len(jobs), "cheapest placements")
-        taken = [results[number][0] for number in range(len(jobs))]
-        price = sum(one.price for one in taken)
-        self.least = sum(results[number][1] for number in range(len(jobs)))
-        value = float(self.weights @ [one.value for one in taken])
-        frontiers = tuple(
-            site.problem().frontier(price).with_solved(one) for site, one in zip(self._sites, taken, strict=True)
-        )
-        return NetworkAllocation(price, tuple(taken), price, value, value, frontiers)
+    def allocated(self) -> Generator[Progress, None, NetworkAllocation]:
+        """Allocate the budget."""
+        budget, tolerance = self._request.budget, self._request.tolerance
+        frontiers = [site.problem().frontier(budget) for site in self._sites]
+        return (yield from search_allocation(frontiers, self.weights, budget, tolerance, self._solve, gap=self._gap))
 
     def rows(self, allocation: NetworkAllocation) -> list[NetworkSite]:
         """Return the sites of the record."""
@@ -315,22 +271,9 @@ class _Network:
                     bound=_bound_for(frontier, one),
                     coverage=problem.coverage(one.chosen),
                     sensors=sensors,
-                    frontier=_points(frontier),
                 )
             )
         return rows
-
-    def _curve_goals(self) -> list[Goal]:
-        """Return the amounts of money at which the value of the network is computed."""
-        tolerance = max(CURVE_TOLERANCE, self._request.tolerance)
-        budgets = [share * self._request.budget for share in sorted((*CURVE, 1.0))]
-        return [Goal(budget, tolerance, effort=CURVE_EFFORT) for budget in budgets]
-
-    def _curve(self, allocations: Sequence[NetworkAllocation]) -> tuple[NetworkPoint, ...]:
-        """Return the value of the network for amounts of money, with bounds."""
-        weight = float(self.weights.sum())
-        points = [NetworkPoint(one.budget, one.value / weight, one.bound / weight) for one in allocations]
-        return _monotone([NetworkPoint(0.0, 0.0, 0.0), *points])
 
     def _gap(self, value: float, bound: float) -> float:
         """Return the gap of weighted sums of values, as `NetworkRecord.gap` states it."""
@@ -352,8 +295,8 @@ class _Network:
             site = self._sites[requests[number].site]
             if isinstance(result, Failure):
                 raise SeipError(f"{site.place.name}: {result.message}")
-            results[number] = result[0]
-            site.store(result[0])
+            results[number] = result
+            site.store(result)
             yield Progress(done, len(jobs), "searching placements for amounts of money", counted=False)
         return [one for one in results if one is not None]
 
@@ -403,24 +346,3 @@ def _bound_for(frontier: Frontier, one: SolvedBudget) -> float:
     """Return the bound on the value for the money that a placement costs."""
     within = frontier.amounts <= one.price * (1 + 1e-9)
     return max(one.value, float(frontier.bounds()[within][-1]))
-
-
-def _points(frontier: Frontier) -> tuple[NetworkPoint, ...]:
-    """Return the best placements found at a site for rising prices, with their bounds."""
-    options = frontier.found_options()
-    bounds = frontier.bounds()
-    within = np.searchsorted(frontier.amounts, options.prices * (1 + 1e-9), side="right") - 1
-    return tuple(
-        NetworkPoint(float(price), float(value), max(float(value), float(bound)))
-        for price, value, bound in zip(options.prices, options.values, bounds[within], strict=True)
-    )
-
-
-def _monotone(points: Sequence[NetworkPoint]) -> tuple[NetworkPoint, ...]:
-    """Return points whose values never fall with more money, and whose bounds never rise with less."""
-    values = np.maximum.accumulate([one.value for one in points])
-    bounds = np.minimum.accumulate([one.bound for one in points][::-1])[::-1]
-    return tuple(
-        replace(one, value=float(value), bound=max(float(value), float(bound)))
-        for one, value, bound in zip(points, values, bounds, strict=True)
-    )

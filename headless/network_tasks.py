@@ -67,12 +67,11 @@ class SurveyJob:
 
 @dataclass(frozen=True)
 class SolveJob:
-    """A budget to solve at a site; with ``coverage``, the least price of that coverage instead."""
+    """A budget to solve at a site."""
 
     problem: bytes
     budget: float
     effort: float
-    coverage: float | None = None
 
 
 @dataclass(frozen=True)
@@ -107,16 +106,14 @@ def write_placement(job: PlaceJob) -> Files | Failure:
     return _in_process(job, job.files, None)
 
 
-def solve_budget(job: SolveJob) -> tuple[SolvedBudget, float] | Failure:
-    """Return the best placement within a budget, or the cheapest of a coverage with the bound on its price."""
+def solve_budget(job: SolveJob) -> SolvedBudget | Failure:
+    """Return the best placement within a budget."""
     with tempfile.TemporaryDirectory(prefix="seip-") as folder:
         path = Path(folder) / SURVEY_FILES[3]
         path.write_bytes(job.problem)
         problem, _ = SiteProblem.load(path)
     try:
-        if job.coverage is not None:
-            return finish(problem.cheapest(job.coverage, job.effort))
-        return finish(problem.solve(job.budget, job.effort)), 0.0
+        return finish(problem.solve(job.budget, job.effort))
     except SeipError as error:
         return Failure(str(error))
 

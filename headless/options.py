@@ -15,8 +15,6 @@ from pathlib import Path
 from types import NoneType
 from typing import Any, Literal, TypeVar, get_args, get_origin, get_type_hints
 
-from headless.removed import check_removed
-
 from seip_addon.core.base.counts import typed_number
 from seip_addon.core.base.errors import SeipError
 from seip_addon.core.base.limits import Limits
@@ -89,7 +87,6 @@ class _Parser(argparse.ArgumentParser):
     ) -> tuple[argparse.Namespace, list[str]]:
         """Parse arguments whose lists of numbers may have commas."""
         given = sys.argv[1:] if args is None else args
-        check_removed(given, list(self._option_string_actions))
         return super().parse_known_args(list(self._with_numbers_apart(given)), namespace)
 
     def _with_numbers_apart(self, args: Sequence[str]) -> Iterator[str]:

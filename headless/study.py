@@ -23,22 +23,12 @@ STUDIES = {
     "criteria": "placement criteria compared by what a detector finds",
     "random-sites": "random sites with traffic, to train detectors on",
     "site-training": "training of a detector on several sites",
-    "open-benchmark": "criteria and placements scored on ten junctions",
-    "paper": "the paper's case study on its map and traffic",
+    "open-benchmark": "placement criteria scored on ten junctions",
+    "paper": "the paper's case study on its map",
     "stability": "limits of every method",
-    "benchmark": "speed against accuracy, and growth",
+    "benchmark": "speed of visibility, placement and scans",
 }
 """Studies by name: a folder each in `headless/studies`."""
-
-REMOVED = {
-    "calibration": "docs/sensors.md has its figures",
-    "detector-settings": "docs/detection.md has its figures",
-    "field-recordings": "docs/recordings.md has its figures; `make recording` writes the shipped recording again",
-    "ingredients": "docs/detection.md has its figures",
-    "network-practice": "docs/network.md has its figures",
-    "network-scale": "docs/network.md has its figures",
-}
-"""Studies of earlier versions, and where their figures are."""
 
 
 def main(argv: list[str]) -> None:
@@ -47,8 +37,6 @@ def main(argv: list[str]) -> None:
         runtime.print_line(_usage())
         return
     name = argv[0]
-    if name in REMOVED:
-        raise SeipError(f"there is no study {name!r} any more: {REMOVED[name]}")
     if name not in STUDIES:
         raise SeipError(f"there is no study {name!r}: seip study --help lists the studies")
     importlib.import_module(f"headless.studies.{name.replace('-', '_')}.command").main(argv[1:])

@@ -11,7 +11,6 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from seip_addon.core.base.arrays import Float
-from seip_addon.core.base.errors import SeipError
 from seip_addon.core.output.pictures.chart_style import (
     FAINT_COLOUR,
     colour,
@@ -24,28 +23,7 @@ from seip_addon.core.output.pictures.palette import INK, PAPER, SERIES_COLOURS, 
 
 PANEL_SIZE = (6.0, 4.4)  # inches
 RING_MARK: dict[str, Any] = {"linestyle": "none", "marker": "o", "mfc": "none", "mec": INK}
-LINE_STYLES = ("-", (0, (5, 1.5)), (0, (1.5, 1.5)), (0, (5, 1.5, 1.5, 1.5)))
-
 PRECISION_LABEL = "average precision"
-
-
-@dataclass(frozen=True, eq=False)
-class PrecisionRecallLine:
-    """Precision and recall of one type and number of sensors.
-
-    Parameters
-    ----------
-    sensor, count
-        Catalogue key, and N, the largest number of sensors allowed.
-    recall, precision : (s,) float64, 0 to 1
-        Recall and precision at each score, the highest first.
-    """
-
-    sensor: str
-    count: int
-    recall: Float
-    precision: Float
-    average_precision: float
 
 
 @dataclass(frozen=True)
@@ -68,23 +46,16 @@ class Bin:
     value: float
 
 
-BinnedFigure = tuple[str, str, Mapping[str, Sequence[Bin]]]
-"""Labels, with units, of the binned quantity and of the figure, and the bins of each line by name, with equal edges."""
+BinnedFigure = tuple[str, str, Sequence[Bin]]
+"""Labels, with units, of the binned quantity and of the figure, and the bins."""
 
 
 def save_precision_recall_chart(
-    path: str | os.PathLike[str], curves: Sequence[PrecisionRecallLine], title: str
+    path: str | os.PathLike[str], recall: Float, precision: Float, label: str, title: str
 ) -> None:
-    """Draw precision against recall, a colour for each type and a stroke for each number of sensors, as PNG."""
-    check_drawn(curves, "precision against recall")
+    """Draw precision against recall at each score, (s,) each, as PNG."""
     figure, (panel,) = new_figure(*PANEL_SIZE)
-    sensors = list(dict.fromkeys(curve.sensor for curve in curves))
-    counts = sorted({curve.count for curve in curves}, reverse=True)
-    for curve in curves:
-        stroke = LINE_STYLES[counts.index(curve.count) % len(LINE_STYLES)]
-        label = f"{placement_name(curve.count, curve.sensor)}: AP {curve.average_precision:.2f}"
-        style: dict[str, Any] = {"color": colour(sensors.index(curve.sensor)), "linestyle": stroke, "linewidth": 1.6}
-        panel.plot(curve.recall, curve.precision, label=label, **style)
+    panel.plot(recall, precision, label=label, color=colour(0), linewidth=1.6)
     panel.set(xlim=(0, 1.01), ylim=(0, 1.02))
     style_axes(panel, "recall", "precision", "y")
     save_chart(path, figure, title, [panel])
@@ -93,25 +64,15 @@ def save_precision_recall_chart(
 def save_parts_chart(path: str | os.PathLike[str], panels: Sequence[BinnedFigure], title: str) -> None:
     """Draw figures in bins of road users, with one panel for each binned quantity, as PNG.
 
-    Parameters
-    ----------
-    panels : sequence of BinnedFigure
-        Numbers of road users are drawn behind the lines where the bins of the first line have any.
+    Numbers of road users are drawn behind the lines.
     """
-    check_drawn(panels, "detection by parts of the road users")
     figure, axes = new_figure(PANEL_SIZE[0] * 0.85 * len(panels), PANEL_SIZE[1], len(panels))
-    for panel, (what, name_of_figure, lines) in zip(axes, panels, strict=True):
-        first = next(iter(lines.values()))
-        places, road_users = range(len(first)), [one.wanted for one in first]
-        if any(road_users):
-            _draw_road_users(panel, road_users)
-        for row, (name, bins) in enumerate(lines.items()):
-            panel.plot(places, [one.value for one in bins], label=name, linewidth=1.6, **mark_style(row))
-        panel.set_xticks(places, [_span(one) for one in first], fontsize=8)
-        panel.set_xlim(-0.5, len(places) - 0.5)
-        panel.set_ylim(bottom=0)
-        if any(road_users):
-            panel.set_ylim(0, 1.03)
+    for panel, (what, name_of_figure, bins) in zip(axes, panels, strict=True):
+        _draw_road_users(panel, [one.wanted for one in bins])
+        panel.plot(range(len(bins)), [one.value for one in bins], linewidth=1.6, **mark_style(0))
+        panel.set_xticks(range(len(bins)), [_span(one) for one in bins], fontsize=8)
+        panel.set_xlim(-0.5, len(bins) - 0.5)
+        panel.set_ylim(0, 1.03)
         style_axes(panel, what, name_of_figure, "y")
     save_chart(path, figure, title, axes[:1])
 
@@ -128,7 +89,6 @@ def save_training_chart(
     validation : mapping of int to float
         Average precision by number of steps; the best is marked.
     """
-    check_drawn(loss, "a training")
     figure, (panel,) = new_figure(PANEL_SIZE[0] * 1.25, PANEL_SIZE[1])
     each = np.arange(1, len(loss) + 1)
     panel.plot(each, loss, color=FAINT_COLOUR, linewidth=0.7, label="loss")
@@ -156,17 +116,6 @@ def save_training_chart(
         for side in ("top", "left"):
             beside.spines[side].set_visible(False)
     save_chart(path, figure, title, panels)
-
-
-def check_drawn(drawn: Sequence[object] | Mapping[str, object], what: str) -> None:
-    """Raise SeipError if there is nothing to draw in a chart of `what`."""
-    if not drawn:
-        raise SeipError(f"there are no data for a chart of {what}: evaluate a detector first")
-
-
-def placement_name(count: int, sensor: str) -> str:
-    """Return the name of a type and number of sensors in charts."""
-    return f"{count} × {sensor}"
 
 
 def mark_style(row: int) -> dict[str, Any]:

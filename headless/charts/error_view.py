@@ -14,7 +14,6 @@ from matplotlib.path import Path
 from shapely.geometry.base import BaseGeometry
 
 from seip_addon.core.base.arrays import Boolean, Float
-from seip_addon.core.base.errors import SeipError
 from seip_addon.core.output.pictures.chart_style import limits_around, new_figure, save_chart
 from seip_addon.core.output.pictures.drawing import SENSOR_MARK, box_corners, draw_attribution, draw_polygons
 from seip_addon.core.output.pictures.palette import INK, SOFT_INK
@@ -71,8 +70,6 @@ def save_error_view(
     attribution : sequence of str
         Credits required by the sources of the scene.
     """
-    if not views:
-        raise SeipError("there are no frames to draw: evaluate a detector on at least one frame")
     limits, shape = limits_around(shapely.total_bounds([view.region for view in views]), MARGIN_SHARE)
     figure, panels = new_figure(PICTURE_SIDE * len(views), PICTURE_SIDE * shape + 1.1, len(views), dpi=DPI)
     for panel, view in zip(panels, views, strict=True):

@@ -1,4 +1,4 @@
-"""Charts of coverage under pose errors and in traffic, and of the price of robust placements."""
+"""Charts of coverage under pose errors and in traffic."""
 
 import os
 from collections.abc import Sequence
@@ -40,8 +40,8 @@ from seip_addon.core.workflows.survey import Survey
 
 FIGURE_SIZE = (7.6, 4.4)  # inches
 
-X_LETTERS, Y_LETTERS, LEGEND_LETTERS = 80, 34, 44
-"""Characters per line below the axis, next to it, and in one of two columns of the legend."""
+X_LETTERS, LEGEND_LETTERS = 80, 44
+"""Characters per line below the axis, and in one of two columns of the legend."""
 
 TIME_CMAP = LinearSegmentedColormap.from_list("time", (SEEN_COLOURS[0], "#f7e3ae", *SEEN_COLOURS[1:]))
 """Colour map from never to always visible: from the colour of uncovered targets to that of targets seen by two."""
@@ -60,10 +60,9 @@ def save_evaluation_charts(folder: Path, survey: Survey, solution: Solution) -> 
     if evaluation is None:
         return
     if evaluation.pose_study is not None:
-        spread, losses, frontier = (folder / picture for picture in POSE_ERROR_PICTURES)
+        spread, losses = (folder / picture for picture in POSE_ERROR_PICTURES)
         save_spread_chart(spread, [evaluation], f"{name}: coverage under pose errors")
         save_loss_chart(losses, evaluation.pose_study, f"{name}: what costs coverage")
-        save_frontier_chart(frontier, [evaluation], f"{name}: what robustness costs and saves")
     if evaluation.scenarios.kind == "traffic":
         time_seen, traffic = (folder / picture for picture in TRAFFIC_PICTURES)
         title = f"{name}: share of time seen, {evaluation.robust.road_users:.0f} road users at a time"
@@ -110,22 +109,6 @@ def save_loss_chart(path: str | os.PathLike[str], study: PoseStudy, title: str) 
     axes.invert_yaxis()
     axes.xaxis.set_major_formatter(PercentFormatter(1.0, decimals=2))
     style_axes(axes, "mean loss of coverage, 95 % interval")
-    save_chart(path, figure, title)
-
-
-def save_frontier_chart(path: str | os.PathLike[str], comparisons: Sequence[Comparison], title: str) -> None:
-    """Draw the 5 % quantile over unseen draws against the planned coverage of each placement, as PNG."""
-    figure, (axes,) = new_figure(*FIGURE_SIZE)
-    for row, (label, placed) in enumerate(_labelled(comparisons)):
-        low = placed.low
-        axes.plot([placed.planned] * 2, [low.low, low.high], color=colour(row), linewidth=1.2)
-        axes.plot(placed.planned, low.value, mark(row), color=colour(row), label=label)
-    style_axes(
-        axes, "coverage as planned", fill(f"5 % quantile of {_outcome(comparisons)} over unseen draws", Y_LETTERS)
-    )
-    for axis in (axes.xaxis, axes.yaxis):
-        axis.set_major_formatter(PercentFormatter(1.0, decimals=1))
-    add_legend(figure, [axes], columns=2)
     save_chart(path, figure, title)
 
 

@@ -14,7 +14,6 @@ from seip_addon.core.sensing.scans.frame import Frame
 
 from .average_precision import Evaluation, balanced_score, evaluate
 from .breakdown import recall_by_category
-from .detection_area import DetectionArea
 from .detector import Detector
 from .frame_results import FrameResult, frame_result
 from .inference import detect
@@ -91,17 +90,10 @@ def detect_in_runs(  # what measures where, what looks at it, and how
     runs: Sequence[SampledRun],
     detectors: Sequence[Detector],
     threads: int,
-    areas: Sequence[DetectionArea] | None = None,
 ) -> Generator[Progress, None, list[list[FrameResult]]]:
-    """Detect road users in every frame of some runs; return the frames' results by detector.
-
-    Parameters
-    ----------
-    areas : sequence of DetectionArea, optional
-        Where each detector looks, where that is not the scene's own.
-    """
+    """Detect road users in every frame of some runs; return the frames' results by detector."""
     region = simulator.static.region
-    looking = areas or [simulator.area(detector.settings.pillar) for detector in detectors]
+    looking = [simulator.area(detector.settings.pillar) for detector in detectors]
     results: list[list[FrameResult]] = [[] for _ in detectors]
     total = sum(len(run.times) for run in runs)
     done = 0

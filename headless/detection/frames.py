@@ -1,10 +1,9 @@
-"""Frames of recorded runs as training samples, and checks that splits are independent."""
+"""Frames of runs as training samples, and the check that splits are independent."""
 
 import functools
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations, product
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,8 +11,6 @@ from numpy.typing import NDArray
 from seip_addon.core.base.arrays import Float, Integer
 from seip_addon.core.base.errors import SeipError
 from seip_addon.core.sensing.scans.frame import Frame
-from seip_addon.core.sensing.scans.run_folder import frame_path, load_manifest
-from seip_addon.core.sensing.traffic.run_overlap import VehiclePositions, require_independent
 
 from .detection_area import DetectionArea
 from .detector import TrainingRecord
@@ -32,7 +29,7 @@ class Recording:
     traffic : str
         Identifier of the run of traffic: the source of its trajectories, with its seed.
     frames : sequence of Frame
-        Frames in memory, or read on access.
+        Frames in memory, or simulated on access.
     sensors : tuple of str
         Catalogue keys of the sensors' types, where they are known.
     site : str
@@ -49,24 +46,8 @@ class Recording:
     placement: str = ""
 
 
-def recording_of(folder: Path) -> Recording:
-    """Return the recording in a folder of scans; frames are read on access.
-
-    Raises
-    ------
-    SeipError
-        There is no run of scans in it, or one that was not finished.
-    """
-    record = load_manifest(folder)
-    if not record["complete"]:
-        raise SeipError(f"the run in {folder} was stopped half-way: run the same simulation again to finish it")
-    frames = LazyFrames(len(record["frames"]), lambda number: Frame.load(frame_path(folder, number)))
-    sensors = tuple(str(sensor["sensor"]) for sensor in record["sensors"])
-    return Recording(str(folder), str(record["trajectories"]["source"]), frames, sensors)
-
-
 class LazyFrames(Sequence[Frame]):
-    """Frames that are read or simulated on each access.
+    """Frames that are simulated on each access.
 
     Parameters
     ----------
@@ -190,28 +171,3 @@ def require_separate(splits: Mapping[str, Sequence[Recording]]) -> None:
                     f"{a.name} ({one}) and {b.name} ({other}) show the same run of traffic: "
                     "a detector must be tested on traffic that it has not seen, so simulate another run for one of them"
                 )
-
-
-def require_independent_splits(splits: Mapping[str, Sequence[Recording]]) -> str:
-    """Raise SeipError where two splits show nearly the same traffic; return a message on the overlap of their runs.
-
-    Where vehicles are is read from the labels of all frames.
-
-    Raises
-    ------
-    SeipError
-        Two do.
-    """
-    runs = {
-        what: [_positions(recording) for recording in recordings] for what, recordings in splits.items() if recordings
-    }
-    return require_independent(pair for one, other in combinations(runs.values(), 2) for pair in product(one, other))
-
-
-def _positions(recording: Recording) -> VehiclePositions:
-    frames = list(recording.frames)
-    return VehiclePositions(
-        name=recording.name,
-        time=np.array([frame.time for frame in frames]),
-        xy=[frame.labels.centre[frame.labels.category != "pedestrian", :2] for frame in frames],
-    )

@@ -1,9 +1,5 @@
 """Detection in one cloud."""
 
-import statistics
-import time
-from collections.abc import Callable
-
 import numpy as np
 import torch
 from numpy.typing import NDArray
@@ -19,7 +15,6 @@ from .rotated_boxes import in_plan, suppress
 from .sparse_inference import sparse_output
 
 MIN_SCORE = 0.05  # boxes below it are not kept: average precision hardly sees them, and time is spent on each
-TIMED_RUNS = 5  # of an inference that is timed, of which the median is taken
 MAX_OVERLAP = 0.1  # intersection over union in plan beyond which two boxes are one road user
 
 
@@ -73,15 +68,3 @@ def detect_on_level(
         score=found.score[stays].double().cpu().numpy(),
         category=found.category[stays].cpu().numpy(),
     )
-
-
-def seconds_of(
-    detector: Detector, area: DetectionArea, frame: Frame, clock: Callable[[], float] = time.perf_counter
-) -> float:
-    """Return the seconds that detection in a frame takes, from its returns to boxes: the median of several runs."""
-    seconds = []
-    for _ in range(TIMED_RUNS):
-        begin = clock()
-        detect(detector, area, frame)
-        seconds.append(clock() - begin)
-    return statistics.median(seconds)

@@ -177,35 +177,6 @@ def fill_pillars(points: NDArray[np.float32], grid: PillarGrid, most: int) -> Pi
     return Pillars(features, pillar, chosen)
 
 
-@dataclass(frozen=True)
-class Filling:
-    """Numbers of points, of pillars, and of pillars with more points than they keep.
-
-    Parameters
-    ----------
-    empty : float, 0 to 1
-        Share of the grid's pillars without a point.
-    over_full : float, 0 to 1
-        Share of the pillars with points that have more points than are kept.
-    left_out : float, 0 to 1
-        Share of the points in the grid that are dropped for this reason.
-    """
-
-    empty: float
-    over_full: float
-    left_out: float
-
-
-def filling(points: NDArray[np.float32], grid: PillarGrid, most: int) -> Filling:
-    """Return the occupancy of the pillars of a cloud (n, 3 or more columns) for a limit of points in each."""
-    _, pillar = _choose(points, grid, len(points) + 1)
-    counts = np.unique(pillar, return_counts=True)[1]
-    if not len(counts):
-        return Filling(1.0, 0.0, 0.0)
-    beyond = np.maximum(counts - most, 0)
-    return Filling(1.0 - len(counts) / len(grid), float((beyond > 0).mean()), float(beyond.sum() / counts.sum()))
-
-
 def stacked(clouds: Sequence[Pillars], grid: PillarGrid) -> Pillars:
     """Return the pillars of several clouds on grids of the same shape, one after the other."""
     return Pillars(

@@ -25,13 +25,6 @@ GRID_STRIDE = 8  # stride of the network's coarsest feature map in pillars; the 
 BOTTOM, TOP = -1.0, 4.5  # metres above the road; points outside are not given to the network
 
 
-def _require(rules: dict[str, bool]) -> None:
-    """Raise the first rule, as a message, that does not hold."""
-    for rule, holds in rules.items():
-        if not holds:
-            raise SeipError(f"detector: {rule}")
-
-
 def _is_integer(value: object, least: int, most: int) -> bool:
     return isinstance(value, int) and least <= value <= most
 
@@ -82,7 +75,9 @@ class NetworkSettings:
             ),
             "padded must be true or false": isinstance(self.padded, bool),
         }
-        _require(rules)
+        for rule, holds in rules.items():
+            if not holds:
+                raise SeipError(f"detector: {rule}")
 
 
 @dataclass(frozen=True)
@@ -125,18 +120,3 @@ class TrainingSettings:
     patience: int = setting(3, "validations without improvement before training stops", minimum=1)
     seed: int = setting(1, "seed of the initial weights and the order of samples", minimum=0)
     threads: int = setting(1, "CPU threads of torch", minimum=1)
-
-    def __post_init__(self) -> None:
-        rules = {
-            "training must have 1 step or more": self.steps >= 1,
-            "a batch must have 1 window or more": self.batch >= 1,
-            "a window must be 5 m wide or more": self.window >= 5,
-            "the learning rate must be positive": self.learning_rate > 0,
-            "the weight decay must be 0 or more": self.weight_decay >= 0,
-            "the fewest points must be 0 or more": self.least_points >= 0,
-            "validation must come every step or more rarely": self.validate_every >= 1,
-            "the patience must be 1 validation or more": self.patience >= 1,
-            "the seed must be 0 or more": self.seed >= 0,
-            "torch needs 1 thread or more": self.threads >= 1,
-        }
-        _require(rules)

@@ -1,36 +1,21 @@
-"""Warnings where a detector is used beyond the sensor types, sites and densities that it was trained on."""
+"""Warnings where a detector is used beyond the sensor types and sites that it was trained on."""
 
 from collections.abc import Sequence
 
-from seip_addon.core.sensing.scans.frame import Frame
-
-from .detection_area import DetectionArea
 from .detector import Detector
-from .pillars import filling
-
-MAX_OVERFULL_SHARE = 0.6
-"""Share of the pillars with points that may have more than are kept: up to it no significant loss was found.
-
-Measured on the shipped junction with four sensors of 32 channels, where pillars
-kept fewer points than in training: `disturbances.Capped`.
-"""
 
 
-def suitability_warnings(
-    detector: Detector, sensors: Sequence[str], area: DetectionArea, frame: Frame
-) -> tuple[str, ...]:
-    """Return warnings about using a detector beyond the types, the sites and the densities that it was trained on.
+def suitability_warnings(detector: Detector, sensors: Sequence[str], site: str) -> tuple[str, ...]:
+    """Return warnings about using a detector beyond the types and the sites that it was trained on.
 
     Parameters
     ----------
     sensors : sequence of str
         Catalogue keys of the types whose clouds it is used on.
-    area : DetectionArea
-        Detection area of the site.
-    frame : Frame
-        That it is used on.
+    site : str
+        Name of the site, or "".
     """
-    found = (_of_types(detector, sensors), _of_site(detector, area.site), _of_pillars(detector, area, frame))
+    found = (_of_types(detector, sensors), _of_site(detector, site))
     return tuple(sentence for sentence in found if sentence)
 
 
@@ -51,15 +36,4 @@ def _of_site(detector: Detector, site: str) -> str:
     return (
         f"the detector was trained only at {sites[0]}, not at {site}: at other sites it may find less than the "
         "shipped detector, which was trained at many sites"
-    )
-
-
-def _of_pillars(detector: Detector, area: DetectionArea, frame: Frame) -> str:
-    most = detector.settings.most_points
-    full = filling(area.cloud(frame), area.grid, most)
-    if full.over_full <= MAX_OVERFULL_SHARE:
-        return ""
-    return (
-        f"{full.over_full:.0%} of the pillars with points have more than the {most} that are kept, "
-        f"and {full.left_out:.0%} of all points are left out: choose smaller pillars, or let them keep more"
     )

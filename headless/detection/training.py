@@ -42,6 +42,9 @@ MAX_CROP_SHIFT = 0.25  # share of a window that it lies beside its road user at 
 MAX_ROTATION, MAX_STRETCH = math.radians(8.0), 0.05  # of training samples; the rotation is in addition to quarter turns
 MAX_LIFT = 0.15  # metres by which all of a window is raised or lowered at most: a road is not known exactly
 MAX_GRADIENT_NORM = 10.0  # norm beyond which a gradient is cut, as published
+_LOCK = threading.Lock()
+_BEFORE: list[tuple[int, int | str, bool]] = []
+"""Settings of torch before each block of `deterministic` that is open, in any thread; the first are restored."""
 
 
 @dataclass(frozen=True)
@@ -407,49 +410,28 @@ def _copied(state: dict[str, Any]) -> dict[str, Tensor]:
     return {name: value.detach().clone() for name, value in state.items()}
 
 
-class _Torch:
-    """Global settings of torch: set by the first user, restored after the last."""
-
-    def __init__(self) -> None:
-        self._lock, self._users = threading.Lock(), 0
-        self._before = (0, 0, False)  # threads, mode of determinism, filling
-
-    def enter(self, threads: int) -> None:
-        # torch has one such setting for the whole process, and trainings run in several threads: only the first user
-        # changes it, and only the last restores it.
-        with self._lock:
-            if not self._users:
-                self._before = (torch.get_num_threads(), torch.get_deterministic_debug_mode(), _fills())
-                self._set(threads, "error", fill=False)  # filling is a debugging aid, and takes a tenth
-            self._users += 1
-
-    def leave(self) -> None:
-        with self._lock:
-            self._users -= 1
-            if not self._users:
-                threads, mode, fill = self._before
-                self._set(threads, mode, fill=fill)
-
-    def _set(self, threads: int, mode: int | str, *, fill: bool) -> None:
-        torch.set_num_threads(threads)
-        # `torch.use_deterministic_algorithms` sets the same, but first imports torch's compiler, which is slow.
-        torch.set_deterministic_debug_mode(mode)
-        torch.utils.deterministic.fill_uninitialized_memory = fill  # type: ignore[attr-defined]  # torch types lack it
-
-
-def _fills() -> bool:
-    return bool(torch.utils.deterministic.fill_uninitialized_memory)  # type: ignore[attr-defined]
-
-
-_TORCH = _Torch()
-
-
 @contextmanager
 def deterministic(threads: int) -> Iterator[None]:
     """Have torch do every sum in the same order, every time; within another such block the number of threads stays."""
     os.environ.setdefault("CUBLAS_WORKSPACE_CONFIG", ":4096:8")  # what CUDA asks for to do so
-    _TORCH.enter(threads)
+    # torch has one such setting for the whole process, and trainings run in several threads: only the first block
+    # changes it, and only the last restores it.
+    with _LOCK:
+        filled = bool(torch.utils.deterministic.fill_uninitialized_memory)  # type: ignore[attr-defined]  # torch types lack it
+        _BEFORE.append((torch.get_num_threads(), torch.get_deterministic_debug_mode(), filled))
+        if len(_BEFORE) == 1:
+            _set(threads, "error", fill=False)  # filling is a debugging aid, and takes a tenth
     try:
         yield
     finally:
-        _TORCH.leave()
+        with _LOCK:
+            known, mode, fill = _BEFORE.pop()
+            if not _BEFORE:
+                _set(known, mode, fill=fill)
+
+
+def _set(threads: int, mode: int | str, *, fill: bool) -> None:
+    torch.set_num_threads(threads)
+    # `torch.use_deterministic_algorithms` sets the same, but first imports torch's compiler, which is slow.
+    torch.set_deterministic_debug_mode(mode)
+    torch.utils.deterministic.fill_uninitialized_memory = fill  # type: ignore[attr-defined]

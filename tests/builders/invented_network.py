@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from seip_addon.core.output.network.network_record import NetworkPoint, NetworkRecord, NetworkSensor, NetworkSite
+from seip_addon.core.output.network.network_record import NetworkRecord, NetworkSensor, NetworkSite
 
 TYPES = ("os1_128", "vlp32c")
 NAMES = {"os1_128": "OS1-128", "vlp32c": "Product <VLP>"}
@@ -34,7 +34,6 @@ def make_site(number, draw, *, middle=(52.47, 13.44), spread=0.02, criterion="ro
     price = sum(sensor.price_usd for sensor in sensors)
     coverage = float(1 - 0.55 ** len(types) * draw.uniform(0.6, 1.3))
     value = coverage if criterion == "road" else float(1.2 * coverage * len(types))
-    frontier = (NetworkPoint(0.0, 0.0, 0.0), NetworkPoint(price, value, value))
     figures = {"price_usd": price, "value": value, "bound": value * 1.01, "coverage": coverage}
     return NetworkSite(
         name,
@@ -46,7 +45,6 @@ def make_site(number, draw, *, middle=(52.47, 13.44), spread=0.02, criterion="ro
         "",
         **figures,
         sensors=sensors,
-        frontier=frontier,
     )
 
 
@@ -60,15 +58,11 @@ def make_network(count=25, *, criterion="road", statuses=("equipped",) * 5 + ("w
 
 
 def network_of(sites, *, criterion="road", **changes):
-    """Return the network of given sites with a concave curve."""
+    """Return the network of given sites."""
     usable = [site for site in sites if site.status != "failed"]
     total = sum(site.weight for site in usable) or 1.0
     value = sum(site.weight * site.value for site in usable) / total
     price = sum(site.price_usd for site in sites)
-    money = np.linspace(0.0, 1.6 * price, 30 if price else 1).tolist()
-    top = 1.0 - math.exp(-1.0)
-    curve = [value * (1.0 - math.exp(-one / (price or 1.0))) / top for one in money]
-    points = tuple(NetworkPoint(a, b, b * 1.02) for a, b in zip(money, curve, strict=True))
     content = {
         "name": "Invented town",
         "budget_usd": 1.02 * price + 1000.0,
@@ -79,7 +73,6 @@ def network_of(sites, *, criterion="road", **changes):
     return NetworkRecord(
         **(content | {"criterion": criterion, "price_usd": price, "value": value, "bound": 1.02 * value} | changes),
         sites=sites,
-        curve=points,
         sensor_types=TYPES,
         sensor_names=NAMES,
     )

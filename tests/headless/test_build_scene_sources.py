@@ -61,7 +61,7 @@ def test_a_mistake_leaves_nothing_behind(more, complaint, street, tmp_path, monk
     assert set(tmp_path.iterdir()) == before
 
 
-def test_a_chart_shows_what_boxes_cost(street, tmp_path):
+def test_objects_of_a_survey_stand_in_the_scene(street, tmp_path):
     pytest.importorskip("laspy")
     pytest.importorskip("lazrs")
     from seip_addon.core.geometry.geo_reference import projection  # noqa: PLC0415
@@ -72,7 +72,6 @@ def test_a_chart_shows_what_boxes_cost(street, tmp_path):
     survey = write_survey(tmp_path / "survey.laz", points, (X, Y), projection("EPSG:25833").wkt)
     scene = build(street, tmp_path, "--terrain", survey)
     assert [obj.name for obj in scene.objects if obj.get(contract.SOURCE) == "survey"] == ["Surveyed building 1"]
-    assert (tmp_path / "site.boxes.png").stat().st_size > 1000
 
 
 @needs_sumo

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 
-from headless.studies.full_scan import seen_by_tilted_full_scan
+from headless.studies.benchmark.visibility import seen_by_tilted_full_scan
 
 import numpy as np
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from headless.studies.full_frames import SLACK
+from headless.studies.benchmark.scans import SLACK
 
 import numpy as np
 

@@ -4,13 +4,11 @@ import csv
 import math
 
 from headless.studies.open_benchmark import command
-from headless.studies.open_benchmark.choices import choice_losses, save_speed_accuracy_chart
 from headless.studies.open_benchmark.sites import read_sites
 from headless.studies.open_benchmark.table import (
     AP,
     COLUMNS,
     CRITERIA,
-    HALVES,
     criterion_column,
     read_criterion,
     read_table,
@@ -59,46 +57,6 @@ def test_rank_correlation_and_loss_are_means_over_sites(table):
         12.706 * 0.4 * math.sqrt(2) / math.sqrt(2), rel=1e-3
     )
     assert math.isinf(pedestrians.loss.high)
-
-
-def test_choices_are_scored_on_runs_that_they_did_not_see(tmp_path):
-    """Six placements of one class; by hand, with the choices that coverage and returns shortlist."""
-    first, second = [0.1, 0.5, 0.9, 0.3, 0.2, 0.4], [0.6, 0.4, 0.7, 0.9, 0.1, 0.2]
-    coverage, returns = [6, 5, 1, 2, 3, 4], [1, 6, 2, 5, 4, 3]
-    path = tmp_path / "placements.csv"
-    with path.open("w", newline="", encoding="utf-8") as file:
-        rows = csv.DictWriter(file, COLUMNS)
-        rows.writeheader()
-        for number, (one, other, seen, found) in enumerate(zip(first, second, coverage, returns, strict=True), start=1):
-            row = dict.fromkeys(COLUMNS, "") | {"site": "one", "placement": number, "coverage": seen, "returns": found}
-            rows.writerow(row | dict(zip(HALVES["vehicles"], (one, other), strict=True)))
-    lost = {name: loss.value for name, loss in choice_losses(path, read_table(path)).items()}
-    # the default is placement 2, with 0.5 in the first half and 0.4 in the second
-    assert lost["returns"] == 0.0
-    assert lost["coverage"] == pytest.approx(((0.4 - 0.6) + (0.5 - 0.1)) / 2)
-    # placements 1 and 2: the second is better in the first half, the first in the second
-    assert lost["2 finalists"] == pytest.approx(((0.4 - 0.4) + (0.5 - 0.1)) / 2)
-    # coverage ranks 1 2 6 5 4 3, returns 2 4 5 6 3 1: in turn 1, 2, 4, 6
-    assert lost["4 finalists"] == pytest.approx(((0.4 - 0.4) + (0.5 - 0.3)) / 2)
-    # of all six, the third is the best in the first half, the fourth in the second
-    assert lost["8 finalists"] == lost["16 finalists"] == pytest.approx(((0.4 - 0.7) + (0.5 - 0.3)) / 2)
-    assert "blend" not in lost
-    chart = tmp_path / "chart.png"
-    save_speed_accuracy_chart(chart, {"coverage": 2.0, "2 finalists": 90.0}, choice_losses(path, read_table(path)), "")
-    assert chart.stat().st_size > 10_000
-
-
-def test_choices_need_the_criteria_of_finalists_and_halves_of_the_runs(table, tmp_path):
-    with pytest.raises(SeipError, match="no average precision by halves"):
-        choice_losses(table, read_table(table))
-    path = tmp_path / "without_returns.csv"
-    with path.open("w", newline="", encoding="utf-8") as file:
-        rows = csv.DictWriter(file, COLUMNS)
-        rows.writeheader()
-        row = dict.fromkeys(COLUMNS, "") | {"site": "one", "placement": 1, "coverage": 1}
-        rows.writerow(row | dict.fromkeys(HALVES["vehicles"], 0.5))
-    with pytest.raises(SeipError, match="no values of returns at one"):
-        choice_losses(path, read_table(path))
 
 
 def test_criterion_is_read_in_any_order_of_rows(table, tmp_path):

@@ -1,1 +1,1 @@
-"""Benchmark of visibility and placement, and of their growth."""
+"""Benchmark of visibility, placement and scans."""

@@ -1,4 +1,4 @@
-"""Benchmark of visibility, placement and scans: a page with speed against accuracy, gaps to bounds, and growth.
+"""Benchmark of visibility, placement and scans: a page with speed and gaps to bounds.
 
 seip study benchmark scenes/junction.blend -o docs
 """
@@ -8,17 +8,12 @@ import importlib.metadata
 import logging
 import os
 from dataclasses import dataclass, field, replace
-from functools import partial
 from pathlib import Path
 
 from headless import runtime
-from headless.studies.benchmark.charts import save_charts
-from headless.studies.benchmark.growth import Growth, corridor_growth, placement_growth
 from headless.studies.benchmark.placement import METHODS, SolverRun, compare
 from headless.studies.benchmark.report import Findings, requirements, save_page
-from headless.studies.benchmark.resource_usage import in_fresh_process
 from headless.studies.benchmark.scans import scan_costs
-from headless.studies.benchmark.simplifications import SITE_SENSORS, degradations, simplifications
 from headless.studies.benchmark.street_visibility import street_problem
 from headless.studies.benchmark.visibility import sampled_positions, visibility_costs
 
@@ -27,16 +22,19 @@ import bpy
 from seip_addon.core.base.progress import finish
 from seip_addon.core.choosing.placement.objective import Objective, placement_problem
 from seip_addon.core.sensing.lidar.catalogue import find_models, load_catalogue
-from seip_addon.core.sensing.lidar.model import LidarModel, fields_of_view
+from seip_addon.core.sensing.lidar.model import fields_of_view
 from seip_addon.core.sensing.scans.static_scene import static_scene
 from seip_addon.core.sensing.visibility.grid import compute_visibility
 from seip_addon.core.sensing.visibility.settings import VisibilitySettings
 from seip_addon.core.site.candidates import PAPER_TYPES, CandidateSettings
 from seip_addon.core.site.scene_geometry import SceneGeometry
-from seip_addon.core.site.site import Site, make_site
+from seip_addon.core.site.site import make_site
 from seip_addon.scene.read import read_scene
 
 LOG = logging.getLogger(__name__)
+
+SITE_SENSORS = 4
+"""Number of sensors that are placed at the scene's site."""
 
 LARGEST_METHODS = ("local search", "ours")
 """Methods that can solve the largest instance."""
@@ -44,7 +42,7 @@ LARGEST_METHODS = ("local search", "ours")
 
 @dataclass(frozen=True)
 class BenchmarkScope:
-    """Sizes of the benchmark: the scene's layout, synthetic instances and steps of growth.
+    """Sizes of the benchmark: the scene's layout and synthetic instances.
 
     Parameters
     ----------
@@ -58,12 +56,6 @@ class BenchmarkScope:
         Small and large number of sensors in the street grid.
     largest : tuple of int
         Largest street grid, as ``street``; solved for the large number of sensors.
-    growth_positions : int
-        Number of sampled positions in the measurements of growth.
-    multiples : tuple of int
-        Multiples of the size that grows in the street grids.
-    copies : tuple of int
-        Numbers of copies of the scene in a row.
     scanned_by : str
         Type of the sensors that scan traffic.
     frames : int
@@ -76,9 +68,6 @@ class BenchmarkScope:
     street: tuple[int, int, int] = (333, 5000, 3)
     counts: tuple[int, int] = (4, 16)
     largest: tuple[int, int, int] = (1000, 20000, 8)
-    growth_positions: int = 8
-    multiples: tuple[int, ...] = (1, 2, 4, 8)
-    copies: tuple[int, ...] = (1, 2, 4, 8, 16)
     scanned_by: str = "type2"
     frames: int = 10
 
@@ -87,7 +76,7 @@ def main(argv: list[str], scope: BenchmarkScope | None = None) -> None:
     """Run the measurements and write the results into a folder; tests pass a small ``scope``."""
     parser = argparse.ArgumentParser(prog="benchmark", description=__doc__.splitlines()[0])
     parser.add_argument("scene", type=Path, help="scene (.blend)")
-    parser.add_argument("-o", "--output", type=Path, required=True, help="folder for benchmark.md and benchmark/*.png")
+    parser.add_argument("-o", "--output", type=Path, required=True, help="folder for benchmark.md")
     options = parser.parse_args(argv)
     runtime.check_folder(options.output)
     runtime.open_scene(options.scene)
@@ -96,8 +85,6 @@ def main(argv: list[str], scope: BenchmarkScope | None = None) -> None:
         verdict = "" if one.met else " – NOT MET"
         runtime.print_line(f"{one.quantity}: required {one.required}, measured {one.measured}{verdict}")
     with runtime.incomplete_if_interrupted(options.output):
-        (options.output / "benchmark").mkdir(exist_ok=True)
-        save_charts(options.output / "benchmark", findings)
         save_page(options.output / "benchmark.md", findings)
     runtime.print_line(f"results: {options.output / 'benchmark.md'}")
 
@@ -107,13 +94,13 @@ def measure(geometry: SceneGeometry, scope: BenchmarkScope) -> Findings:
     settings = VisibilitySettings()
     models = find_models(load_catalogue(), scope.layout.sensors)
     site = make_site(geometry, scope.layout, fields_of_view=fields_of_view(models))
+    # First: a requirement limits its memory, and memory of earlier work would hide a part.
+    positions, targets, blocks = scope.largest
+    street = street_problem(positions, targets, blocks=blocks, count=scope.counts[-1])
+    largest = compare(_street_name(scope.largest, scope.counts[-1]), street, LARGEST_METHODS, 2 * scope.effort)
     LOG.info(f"{site.name}: full and lazy scans from {scope.positions} positions")
-    simpler = simplifications(geometry, site, models, scope.layout)
-    visibility = visibility_costs(site, models, settings, scope.positions, simpler)
-    LOG.info("errors of simplified grids")
-    errors = degradations(site, models, settings, simpler, scope.effort)
-    runs = placement_runs(geometry, settings, scope)
-    growths = measure_growth(site, models, settings, scope)
+    visibility = visibility_costs(site, models, settings, scope.positions)
+    runs = [*placement_runs(geometry, settings, scope), *largest]
     LOG.info("scans of traffic")
     scans = scan_costs(site, static_scene(geometry), load_catalogue()[scope.scanned_by], scope.frames)
     setting = {
@@ -122,18 +109,17 @@ def measure(geometry: SceneGeometry, scope: BenchmarkScope) -> Findings:
         "poses": len(site.candidates),
         "triangles": len(site.triangles),
         "positions": len(sampled_positions(site, scope.positions)),
-        "sensor": scope.layout.sensors[0],
         "scanned_by": scope.scanned_by,
         "frames": scope.frames,
         "effort": scope.effort,
         "cores": os.cpu_count(),
         "versions": {name: importlib.metadata.version(name) for name in ("bpy", "numpy", "embreex", "PuLP", "highspy")},
     }
-    return Findings(setting, visibility, errors, runs, growths, scans)
+    return Findings(setting, visibility, runs, scans)
 
 
 def placement_runs(geometry: SceneGeometry, settings: VisibilitySettings, scope: BenchmarkScope) -> list[SolverRun]:
-    """Compare placement methods for the scene's first type, in street grids, and in the largest street grid."""
+    """Compare placement methods for the scene's first type, and in street grids."""
     first = scope.layout.sensors[0]
     models = find_models(load_catalogue(), [first])
     layout = replace(scope.layout, sensors=(first,))
@@ -146,30 +132,10 @@ def placement_runs(geometry: SceneGeometry, settings: VisibilitySettings, scope:
         positions, targets, blocks = scope.street
         street = street_problem(positions, targets, blocks=blocks, count=count)
         runs += compare(_street_name(scope.street, count), street, list(METHODS), scope.effort)
-    positions, targets, blocks = scope.largest
-    street = street_problem(positions, targets, blocks=blocks, count=scope.counts[-1])
-    name = _street_name(scope.largest, scope.counts[-1])
-    # in a process of its own: a requirement limits its memory, and memory of earlier work would hide a part
-    runs += in_fresh_process(partial(compare, name, street, LARGEST_METHODS, 2 * scope.effort))
     for run in runs:
         seconds = f"{run.expense.cpu:>8.2f} s of CPU"
         LOG.info(f"{run.instance}: {run.method:<13}{run.objective:>10.0f} ≤ {run.bound:<10.1f}{seconds}")
     return runs
-
-
-def measure_growth(
-    site: Site, models: dict[str, LidarModel], settings: VisibilitySettings, scope: BenchmarkScope
-) -> list[Growth]:
-    """Measure growth with copies of the scene side by side, and in street grids."""
-    LOG.info("growth of time and memory, each size in a process of its own")
-    positions, targets, blocks = scope.street
-    more_positions = [(positions * n // scope.multiples[-1], targets, blocks) for n in scope.multiples]
-    more_targets = [(positions, targets * n // 2, blocks) for n in scope.multiples]
-    return [
-        corridor_growth(site, scope.copies, models, settings, scope.growth_positions),
-        placement_growth("poses", [(3 * street[0], street) for street in more_positions], scope.effort),
-        placement_growth("targets", [(street[1], street) for street in more_targets], scope.effort),
-    ]
 
 
 def _street_name(street: tuple[int, int, int], count: int) -> str:

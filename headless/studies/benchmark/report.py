@@ -8,10 +8,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from headless.studies.benchmark.growth import Growth
 from headless.studies.benchmark.placement import SolverRun
 from headless.studies.benchmark.scans import ROAD_USERS, SENSORS, ScanCost
-from headless.studies.benchmark.simplifications import EXACT, SITE_SENSORS, Degradation
 from headless.studies.benchmark.visibility import ENGINES, Cost
 from headless.studies.markdown import table
 
@@ -46,21 +44,16 @@ class Findings:
     setting : dict
         Scene and sizes measured, number of cores, and versions.
     visibility : dict of str to Cost
-        Cost of visibility by method, those on simplified scenes included.
-    degradations : dict of str to Degradation
-        Errors of visibility and placement by simplification, and of the exact scene.
+        Cost of visibility by method.
     runs : sequence of SolverRun
         Runs of placement methods: on the site, in a street grid with few and with many sensors, and in the largest.
-    growths : sequence of Growth
     scans : dict of str to ScanCost
         Cost of the scanned frames by method and ray caster.
     """
 
     setting: Mapping[str, Any]
     visibility: Mapping[str, Cost]
-    degradations: Mapping[str, Degradation]
     runs: Sequence[SolverRun]
-    growths: Sequence[Growth]
     scans: Mapping[str, ScanCost]
 
 
@@ -91,12 +84,11 @@ def requirements(findings: Findings) -> list[Requirement]:
 
 
 def save_page(path: str | os.PathLike[str], findings: Findings) -> None:
-    """Write the page, which shows the charts of ``benchmark/`` next to it."""
+    """Write the page."""
     parts = [
         *_summary(findings),
         *_about_visibility(findings),
         *_about_placement(findings),
-        *_about_growth(findings),
         *_about_scans(findings),
     ]
     with whole_file(path) as temporary:
@@ -137,51 +129,9 @@ def _about_visibility(findings: Findings) -> list[str]:
             f"{cost.rays / cost.seen:.1f}" if cost.seen else "–",
         )
         for method, cost in findings.visibility.items()
-        if method.partition(" ")[2] in ENGINES
     ]
     head = ("method", "times as fast as the plain loop", "s", "wall-clock s", "rays", "rays per visible target")
-    return ["## Visibility", text, table(head, rows), *_about_simplifications(findings)]
-
-
-def _about_simplifications(findings: Findings) -> list[str]:
-    text = (
-        "Simplified scenes and sensors, with Embree: wider azimuth steps, every second channel, coarser grids of "
-        "targets, and objects replaced by their bounding boxes or decimated to a quarter of their faces. Errors are "
-        "for the whole grid: wrong pairs of pose and target, per pair that is visible in the exact grid. The placement "
-        f"of {SITE_SENSORS} {findings.setting['sensor']} sensors is optimised on the simplified grid, which claims one "
-        "coverage, and evaluated on the exact grid. The default is lazy with Embree on the exact scene."
-    )
-    plain, exact = findings.visibility["full bvh"].expense.cpu, findings.degradations[EXACT]
-    rows = []
-    for name, own in findings.degradations.items():
-        variant = "embree" if name == EXACT else name
-        full, lazy = (findings.visibility[f"{scan} {variant}"].expense.cpu for scan in ("full", "lazy"))
-        rows.append(
-            (
-                name,
-                f"{plain / full:.3g}",
-                f"{plain / lazy:.3g}",
-                f"{lazy:.3g}",
-                f"{own.wrong:.2%}",
-                f"{own.claimed:.2%}",
-                f"{own.coverage:.2%}{'' if own.proven else ', placement not proven'}",
-                f"{100 * (exact.coverage - own.coverage):.2f}",
-                f"{own.kept} of {exact.kept}",
-            )
-        )
-    head = (
-        "simplification",
-        "full scan, times as fast as the plain loop",
-        "lazy, times as fast",
-        "lazy, s",
-        "wrong pairs",
-        "claimed coverage",
-        "exact coverage",
-        "lost, points",
-        "poses kept",
-    )
-    picture = "![processor time against error of visibility](benchmark/visibility.png)"
-    return ["### Simplifications", text, picture, table(head, rows)]
+    return ["## Visibility", text, table(head, rows)]
 
 
 def _about_placement(findings: Findings) -> list[str]:
@@ -209,30 +159,7 @@ def _about_placement(findings: Findings) -> list[str]:
         for run in findings.runs
     ]
     head = ("instance", "method", "ours is … times as fast", "s", "wall-clock s", "MB", "covers", "gap", "own gap")
-    picture = "![processor time against gap of placement](benchmark/placement.png)"
-    return ["## Placement", text, picture, table(head, rows)]
-
-
-def _about_growth(findings: Findings) -> list[str]:
-    text = (
-        "Each size ran in a process of its own. For corridors, visibility was computed at a sample of positions and "
-        "scaled up to all. An exponent of b means that twice the size costs 2^b times as much (least squares over all "
-        "sizes); a fixed cost that does not depend on the size makes it smaller."
-    )
-    rows = [
-        (
-            growth.task,
-            growth.quantity,
-            " ".join(f"{size:,.0f}" if size > 100 else f"{size:.3g}" for size, _, _ in growth.costs),
-            " ".join(f"{seconds:.3g}" for _, seconds, _ in growth.costs),
-            f"{growth.time_exponent:.2f}",
-            " ".join("–" if memory is None else f"{memory:.0f}" for _, _, memory in growth.costs),
-            "–" if growth.memory_exponent is None else f"{growth.memory_exponent:.2f}",
-        )
-        for growth in findings.growths
-    ]
-    head = ("work", "growing size", "sizes", "s", "exponent", "MB", "exponent of memory")
-    return ["## Growth", text, table(head, rows)]
+    return ["## Placement", text, table(head, rows)]
 
 
 def _about_scans(findings: Findings) -> list[str]:

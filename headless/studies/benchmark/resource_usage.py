@@ -1,11 +1,8 @@
-"""Processor time, wall-clock time and peak memory of a piece of work, and work in a fresh process."""
+"""Processor time, wall-clock time and peak memory of a piece of work."""
 
 from __future__ import annotations
 
 import os
-import pickle
-import subprocess
-import sys
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -15,7 +12,6 @@ from typing import TypeVar
 Result = TypeVar("Result")
 
 _PROCESS = Path("/proc/self")
-_ROOT = Path(__file__).resolve().parents[3]
 
 
 @dataclass
@@ -56,15 +52,6 @@ def peak_memory(work: Callable[[], Result]) -> tuple[Result, float | None]:
     return result, (_kilobytes("VmHWM") - before) / 1024
 
 
-def in_fresh_process(work: Callable[[], Result]) -> Result:
-    """Return the result of ``work``, a picklable function, run in a new process."""
-    # `multiprocessing` passes on the search path, where bpy has put Blender's scripts before its own package.
-    command = [sys.executable, "-m", __name__]
-    outcome = subprocess.run(command, input=pickle.dumps(work), stdout=subprocess.PIPE, check=True, cwd=_ROOT)  # noqa: S603 - our own interpreter and module
-    result: Result = pickle.loads(outcome.stdout)  # noqa: S301 - written by this very module
-    return result
-
-
 def _processor_seconds() -> float:
     """Return the processor time of this process and its ended children, seconds; nanosecond steps for this process."""
     times = os.times()
@@ -74,15 +61,3 @@ def _processor_seconds() -> float:
 def _kilobytes(entry: str) -> int:
     lines = (_PROCESS / "status").read_text(encoding="ascii").splitlines()
     return next(int(line.split()[1]) for line in lines if line.startswith(f"{entry}:"))
-
-
-def _main() -> None:
-    answer = os.dup(1)
-    os.dup2(2, 1)  # what libraries print must not get into the answer
-    result = pickle.load(sys.stdin.buffer)()  # noqa: S301 - written by this very module
-    with os.fdopen(answer, "wb") as file:
-        pickle.dump(result, file)
-
-
-if __name__ == "__main__":
-    _main()

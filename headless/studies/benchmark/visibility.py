@@ -1,26 +1,26 @@
-"""Time of full scans and of the lazy engine, which must compute the same grid, on exact and simplified scenes."""
+"""Time of full scans and of the lazy engine, which must compute the same grid."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 from headless.studies.benchmark.resource_usage import Expense
-from headless.studies.benchmark.simplifications import Simplification
-from headless.studies.full_scan import seen_by_tilted_full_scan
 
 import numpy as np
 
 from seip_addon.core.base.arrays import Boolean, Integer
 from seip_addon.core.base.errors import SeipError
+from seip_addon.core.geometry.orientation import orientation as orientation_of
 from seip_addon.core.sensing.lidar.model import LidarModel
 from seip_addon.core.sensing.visibility.chunks import compute_rows, sharing_rays
-from seip_addon.core.sensing.visibility.near_surfaces import near_surfaces
+from seip_addon.core.sensing.visibility.near_surfaces import NearSurfaces, near_surfaces, rotated_surfaces
 from seip_addon.core.sensing.visibility.ray_casting import make_ray_caster
-from seip_addon.core.sensing.visibility.scanning import ScanPosition
+from seip_addon.core.sensing.visibility.scanning import ScanPosition, seen_by_rays
 from seip_addon.core.sensing.visibility.settings import Engine, VisibilitySettings
-from seip_addon.core.sensing.visibility.visibility_model import VisibilityModel
+from seip_addon.core.sensing.visibility.target_index import TargetIndex
+from seip_addon.core.sensing.visibility.visibility_model import VisibilityModel, is_upright, yaw_of
 from seip_addon.core.site.site import Site
 
 ENGINES: tuple[Engine, ...] = ("bvh", "embree")
@@ -53,25 +53,19 @@ def sampled_positions(site: Site, samples: int) -> list[Integer]:
 
 
 def visibility_costs(
-    site: Site,
-    models: Mapping[str, LidarModel],
-    settings: VisibilitySettings,
-    samples: int,
-    simpler: Sequence[Simplification] = (),
+    site: Site, models: Mapping[str, LidarModel], settings: VisibilitySettings, samples: int
 ) -> dict[str, Cost]:
-    """Compute visibility at sampled positions by full scans and lazily, with each ray caster and simplification.
+    """Compute visibility at sampled positions by full scans and lazily, with each ray caster.
 
     Parameters
     ----------
     samples : int
         Number of positions, evenly spread over the site.
-    simpler : sequence of Simplification
-        Simplifications, computed only with Embree.
 
     Returns
     -------
     dict of str to Cost
-        Costs by method: ``full bvh``, ``lazy bvh``, ``full embree``, ``lazy embree``, ``full azimuth ÷ 2``, …
+        Costs by method: ``full bvh``, ``lazy bvh``, ``full embree``, ``lazy embree``.
 
     Raises
     ------
@@ -81,14 +75,11 @@ def visibility_costs(
     groups = sampled_positions(site, samples)
     costs: dict[str, Cost] = {}
     for engine in ENGINES:
-        costs |= _full_and_lazy(engine, site, models, settings, engine, groups)
-    for one in simpler:
-        costs |= _full_and_lazy(one.name, one.site, one.models, settings, "embree", groups)
+        costs |= _full_and_lazy(site, models, settings, engine, groups)
     return costs
 
 
 def _full_and_lazy(
-    name: str,
     site: Site,
     models: Mapping[str, LidarModel],
     settings: VisibilitySettings,
@@ -112,5 +103,26 @@ def _full_and_lazy(
         lazy_grid = np.unpackbits(rows.packed, axis=1, count=lazy_model.targets).astype(bool)
         lazy.add(rows.rays, lazy_grid)
         if (full_grid != lazy_grid).any():
-            raise SeipError(f"pose {first}: the lazy {name} grid differs from the full scan: a defect")
-    return {f"full {name}": full, f"lazy {name}": lazy}
+            raise SeipError(f"pose {first}: the lazy {engine} grid differs from the full scan: a defect")
+    return {f"full {engine}": full, f"lazy {engine}": lazy}
+
+
+def seen_by_all_rays(position: ScanPosition, surfaces: NearSurfaces) -> tuple[Boolean, int]:
+    """Find the targets that are seen by casting every ray of every sensor: the reference."""
+    index = TargetIndex(surfaces.xyz, position.settings.delta)
+    rays = [np.arange(model.channels * model.azimuth_count) for model in position.models]
+    seen = [
+        seen_by_rays(position, model, own, surfaces, index) for model, own in zip(position.models, rays, strict=True)
+    ]
+    return np.array(seen), sum(map(len, rays))
+
+
+def seen_by_tilted_full_scan(position: ScanPosition, tilt: float, surfaces: NearSurfaces) -> tuple[Boolean, int]:
+    """Find the targets that sensors tilted by an angle (radians) see, by casting every ray: the reference."""
+    if tilt == 0:
+        return seen_by_all_rays(position, surfaces)
+    orientation = orientation_of(position.yaw, tilt)
+    if is_upright(orientation):
+        return seen_by_all_rays(replace(position, yaw=yaw_of(orientation)), surfaces)
+    in_axes = rotated_surfaces(surfaces, position.origin, orientation)
+    return seen_by_all_rays(position.in_sensor_axes(orientation), in_axes)

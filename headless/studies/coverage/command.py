@@ -4,24 +4,31 @@ seip study coverage scenes/junction.blend -o out/study
 blender -b --python-exit-code 1 site.blend -P headless/study.py -- coverage -o out/study
 """
 
-import argparse
+import os
 
 from headless import runtime, survey
-from headless.options import new_parser
 from headless.studies.claims import save_claims
-from headless.studies.coverage.cells import CHARTED_WEIGHT, COUNTS, coverage_study
+from headless.studies.coverage.cells import CHARTED_WEIGHT, COUNTS, Case, CoverageStudy, EmptyCell, coverage_study
 from headless.studies.coverage.charts import save_height_chart, save_weight_chart
 from headless.studies.coverage.claims import coverage_claims
-from headless.studies.coverage.tables import save_study_table
-from headless.studies.survey_options import add_survey_options
+from headless.studies.survey_options import study_parser
 
 from seip_addon.core.choosing.placement.objective import Objective, check_objective
+from seip_addon.core.geometry.orientation import tilt_degrees
 from seip_addon.core.output.pictures.plan_view import save_plan_view
+from seip_addon.core.storage.csv_table import save_csv
+
+COLUMNS = (
+    "sensor", "height_m", "count", "central_weight", "sensors_used", "heights_used_m", "tilts_used_deg",
+    "coverage", "central_coverage", "seen_twice", "objective", "bound", "gap", "status", "greedy_objective",
+    "price_usd", "note",
+)  # fmt: skip
 
 
 def main(argv: list[str]) -> None:
     """Run the study on one scene and write charts, tables and plans to a folder."""
-    options = _parser().parse_args(argv)
+    what = "Reproduce the paper's coverage figures on a scene; name sensor types from the simplest to the best."
+    options = study_parser("coverage", what).parse_args(argv)
     surveyed, watch = survey.survey(
         options, lambda layout: check_objective(layout.site, layout.models, Objective(count=1))
     )
@@ -49,8 +56,35 @@ def main(argv: list[str]) -> None:
     runtime.print_line(f"written to {folder}/")
 
 
-def _parser() -> argparse.ArgumentParser:
-    what = "Reproduce the paper's coverage figures on a scene; name sensor types from the simplest to the best."
-    parser = new_parser("study coverage", what)
-    add_survey_options(parser)
-    return parser
+def save_study_table(path: str | os.PathLike[str], study: CoverageStudy) -> None:
+    """Write one row for each cell as CSV; for cells without a placement, the column ``note`` has the reason."""
+    rows = [_key(cell) | (_figures(cell) if isinstance(cell, Case) else {"note": cell.note}) for cell in study.cells]
+    save_csv(path, COLUMNS, [[row.get(column, "") for column in COLUMNS] for row in rows])
+
+
+def _key(cell: Case | EmptyCell) -> dict[str, str]:
+    return {
+        "sensor": cell.sensor,
+        "height_m": "free" if cell.height is None else f"{cell.height:g}",
+        "count": f"{cell.count}",
+        "central_weight": f"{cell.weight:g}",
+    }
+
+
+def _figures(case: Case) -> dict[str, str]:
+    placement, deployment = case.placement, case.deployment
+    return {
+        "sensors_used": f"{len(deployment.sensors)}",
+        "heights_used_m": " ".join(f"{sensor.height:g}" for sensor in deployment.sensors),
+        "tilts_used_deg": " ".join(f"{tilt_degrees(sensor.tilt):g}" for sensor in deployment.sensors),
+        "coverage": f"{deployment.coverage:.6f}",
+        "central_coverage": "" if deployment.central is None else f"{deployment.central:.6f}",
+        "seen_twice": f"{deployment.seen_twice:.6f}",
+        "objective": f"{placement.objective:.12g}",
+        "bound": f"{placement.bound:.12g}",
+        "gap": f"{placement.gap:.6g}",
+        "status": placement.status,
+        "greedy_objective": f"{case.greedy.objective:.12g}",
+        "price_usd": f"{deployment.price:.2f}",
+        "note": "; ".join(placement.notes),
+    }

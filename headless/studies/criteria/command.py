@@ -8,24 +8,23 @@ used without further training: it was trained on random sites only. An interrupt
 
 import argparse
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from headless import runtime, survey
 from headless.detection.detector import SHIPPED_DETECTOR, Detector
-from headless.detection.recordings import Simulator, sampled_runs
-from headless.options import new_parser, real_number, whole_number
+from headless.detection.recordings import SampledRun, Simulator, sampled_runs
+from headless.options import real_number, whole_number
 from headless.studies.criteria.criteria_table import (
     CriteriaStudySettings,
-    record_of,
-    row_record,
     study_type,
+    table_cells,
     table_lines,
 )
 from headless.studies.criteria.site_criteria import CRITERIA
-from headless.studies.detection.case_study import split_untrained
-from headless.studies.survey_options import add_rolling_shutter, add_survey_options
+from headless.studies.detection.case_study import MIN_RUNS
+from headless.studies.survey_options import study_parser
 
 import bpy
 
@@ -41,6 +40,7 @@ from seip_addon.core.storage.source_digest import source_digest
 
 SCHEMA = "seip-criteria-study/1"
 TYPE_FILE = "criteria.json"
+RUNS_PER_CRITERIA = 4  # one run in 4 is for criteria that use traffic, the others for tests
 
 
 def main(argv: list[str]) -> None:
@@ -64,7 +64,7 @@ def main(argv: list[str]) -> None:
             own.scene, own.sensor, own.output = scene, [sensor], folder / scene.stem / sensor
             studied.append(_study(own, settings))
             rows = [row for one in studied for row in one["rows"]]
-            save_csv(folder / "criteria.csv", list(rows[0]), record_of(rows))
+            save_csv(folder / "criteria.csv", list(rows[0]), table_cells(rows))
             save_json(folder / "criteria.json", {"schema": SCHEMA, "types": studied})
             for line in table_lines(studied[-1]["rows"]):
                 runtime.print_line(line)
@@ -77,17 +77,16 @@ def _study(options: argparse.Namespace, settings: CriteriaStudySettings) -> Mapp
         options, lambda layout: check_objective(layout.site, layout.models, Objective(count=max(settings.counts)))
     )
     runs = sampled_runs(survey.runs_beside(options.scene), surveyed.geometry.origin, options.every)
-    known, tests = split_untrained(runs)
+    known, tests = _split(runs)
     check_runs([run.trajectories for run in runs], surveyed.site.region)
     for run in runs:
         require_own_traffic(run.trajectories, surveyed.geometry, run.name)
-    scans = ScanSettings(seed=options.scan_seed, rolling_shutter=options.rolling_shutter)
+    scans = ScanSettings(seed=options.scan_seed, rolling_shutter=True)
     settings_record = {
         **surveyed.settings.as_record(),
         **vars(settings),
         "frames_every_s": options.every,
         "scan_seed": options.scan_seed,
-        "rolling_shutter": options.rolling_shutter,
     }
     detector = Detector.load(SHIPPED_DETECTOR)
     key = digest(
@@ -123,17 +122,24 @@ def _study(options: argparse.Namespace, settings: CriteriaStudySettings) -> Mapp
         "test_runs": len(tests),
         "test_frames": sum(len(run.times) for run in tests),
         "seconds": round(watch.seconds["study"]),
-        "rows": [row_record(row) for row in found.rows()],
+        "rows": list(found.rows()),
         "placements": list(found.placements()),
     }
     save_json(path, record)
     return record
 
 
+def _split(runs: Sequence[SampledRun]) -> tuple[Sequence[SampledRun], Sequence[SampledRun]]:
+    """Split runs: the first quarter (at least one) for criteria, the others for tests."""
+    if len(runs) < MIN_RUNS:
+        raise SeipError(f"{len(runs)} runs of traffic are too few: make {MIN_RUNS} or more with seip traffic")
+    count = max(1, len(runs) // RUNS_PER_CRITERIA)
+    return runs[:count], runs[count:]
+
+
 def _parser() -> argparse.ArgumentParser:
     what = "Compare the criteria by which sensors can be placed by what a detector finds with them."
-    parser = new_parser("study criteria", what)
-    add_survey_options(parser)
+    parser = study_parser("criteria", what)
     parser.add_argument("scenes", nargs="*", type=Path, help="more scenes")
     study = parser.add_argument_group("study")
     study.add_argument("--count", nargs="+", type=whole_number(SENSORS), default=[1, 2, 4], metavar="N", help="sensors")
@@ -157,5 +163,4 @@ def _parser() -> argparse.ArgumentParser:
         "--every", type=real_number(TIME_STEP), default=20.0, metavar="S", help="time from frame to frame in tests"
     )
     study.add_argument("--scan-seed", type=whole_number(SEED), default=0, help="of noise and lost returns")
-    add_rolling_shutter(study)
     return parser

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Generator, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -17,23 +17,21 @@ from headless.detection.average_precision import (
 )
 from headless.detection.detector import Detector
 from headless.detection.frame_results import FrameResult
-from headless.detection.recordings import SampledRun, Simulator
+from headless.detection.recordings import MountedSensors, SampledRun, Simulator
 from headless.detection.rules import CLASSES, RULES, precision_by
 from headless.detection.shared_scans import SharedScans, detect_with_all
-from headless.studies.detection.sensor_configuration import SensorConfiguration
+from headless.studies.rank_correlation import rank_correlation
 
 import numpy as np
 
-from seip_addon.core.base.arrays import Float, Integer, Text
+from seip_addon.core.base.arrays import Float, Integer
 from seip_addon.core.base.errors import SeipError
 from seip_addon.core.base.estimates import IntervalEstimate
 from seip_addon.core.base.progress import Progress
 from seip_addon.core.workflows.survey import Survey
 
-from .agreement import correlate
 from .drawing import MIN_PLACEMENTS, draw_from_pool
 from .pose_criteria import PoseCriterion
-from .precision import Precisions
 from .site_criteria import CRITERIA, best_of, problem_of, site_criteria
 
 POOL = 18  # poses of which placements of several sensors are drawn, next to those that criteria like best
@@ -80,7 +78,7 @@ class CountedPlacements:
     kind : tuple of str
         Kind of each placement.
     poses : tuple of (k,) int64
-    configurations : tuple of SensorConfiguration
+    mounted : tuple of MountedSensors
     best : dict of str to int
         Index of the placement that each criterion likes best of all candidates, by the criterion's key.
     """
@@ -88,33 +86,8 @@ class CountedPlacements:
     count: int
     kind: tuple[str, ...]
     poses: tuple[Integer, ...]
-    configurations: tuple[SensorConfiguration, ...]
+    mounted: tuple[MountedSensors, ...]
     best: dict[str, int]
-
-
-@dataclass(frozen=True)
-class Row:
-    """A criterion in one cell of the table, for one class of road users.
-
-    Parameters
-    ----------
-    spearman : IntervalEstimate
-        Of the criterion and average precision over the placements; NaN for fewer than `MIN_PLACEMENTS`.
-    precision : IntervalEstimate
-        Average precision of the placement that the criterion likes best of all candidates.
-    gain : IntervalEstimate
-        That less the average precision of the optimal placement by coverage, on the same traffic.
-    """
-
-    site: str
-    sensor: str
-    count: int
-    criterion: str
-    road_users: str
-    placements: int
-    spearman: IntervalEstimate
-    precision: IntervalEstimate
-    gain: IntervalEstimate
 
 
 def choose_placements(
@@ -139,22 +112,12 @@ def choose_placements(
         pool = shuffled[: POOL if count > 1 else settings.placements + len(sets)]
         drawn = draw_from_pool(problem, pool, chosen, settings.placements, random) if settings.placements else []
         kinds, poses_of = (*names, *(kind for kind, _ in drawn)), (*chosen, *(poses for _, poses in drawn))
-        configurations = tuple(
-            SensorConfiguration(
-                f"{kind} {number}",
-                survey.deploy(poses),
-                next(iter(survey.models)),
-                count,
-                kind,
-                math.inf,
-            )
+        mounted = tuple(
+            MountedSensors(f"{kind} {number}", survey.deploy(poses).sensors)
             for number, (kind, poses) in enumerate(zip(kinds, poses_of, strict=True), start=1)
         )
-        found.append(
-            CountedPlacements(
-                count, kinds, poses_of, configurations, {key: sets.index(some) for key, some in best.items()}
-            )
-        )
+        numbers = {key: sets.index(some) for key, some in best.items()}
+        found.append(CountedPlacements(count, kinds, poses_of, mounted, numbers))
     return tuple(found)
 
 
@@ -183,30 +146,34 @@ class StudiedType:
             {name: [evaluate(own, rule) for own in frames] for name, rule in rules.items()} for frames in self.frames
         )
 
-    def rows(self) -> Iterator[Row]:
-        """Yield the rows of the table, count by count."""
-        for placed, evaluated in zip(self.placed, self.evaluations, strict=True):
-            yield from self._rows_of(placed, evaluated)
+    def rows(self) -> Iterator[dict[str, Any]]:
+        """Yield the rows of the table: a criterion in a cell, for one class of road users.
 
-    def _rows_of(self, placed: CountedPlacements, evaluated: Mapping[str, list[Evaluation]]) -> Iterator[Row]:
-        runs: Text = np.array([frame.run for frame in self.frames[0][0]])
-        for road_users, evaluations in evaluated.items():
-            precise = Precisions(runs, tuple((one,) for one in evaluations))
-            reference = evaluations[placed.best[self.criteria[0].key]]
-            for criterion in self.criteria:
-                values = np.array([criterion.value(poses) for poses in placed.poses])
-                best = evaluations[placed.best[criterion.key]]
-                yield Row(
-                    self.site,
-                    self.sensor,
-                    placed.count,
-                    criterion.name,
-                    road_users,
-                    len(values),
-                    _spearman(values, precise),
-                    precision_of(best),
-                    difference_of(best, reference),
-                )
+        ``spearman`` is the rank correlation of the criterion and average precision over the placements, None for fewer
+        than `MIN_PLACEMENTS`; ``precision`` is the average precision of the placement that the criterion likes best of
+        all candidates, and ``gain`` that less the one of optimal coverage on the same traffic. Open ends of intervals
+        are None.
+        """
+        for placed, evaluated in zip(self.placed, self.evaluations, strict=True):
+            values = {one.key: np.array([one.value(poses) for poses in placed.poses]) for one in self.criteria}
+            for road_users, evaluations in evaluated.items():
+                precision = np.array([one.average_precision for one in evaluations])
+                reference = evaluations[placed.best[self.criteria[0].key]]
+                for criterion in self.criteria:
+                    best = evaluations[placed.best[criterion.key]]
+                    spearman = rank_correlation(values[criterion.key], precision)
+                    known = len(precision) >= MIN_PLACEMENTS and math.isfinite(spearman)
+                    yield {
+                        "site": self.site,
+                        "sensor": self.sensor,
+                        "count": placed.count,
+                        "criterion": criterion.name,
+                        "road_users": road_users,
+                        "placements": len(precision),
+                        "spearman": spearman if known else None,
+                        **_parts("precision", precision_of(best)),
+                        **_parts("gain", difference_of(best, reference)),
+                    }
 
     def placements(self) -> Iterator[dict[str, Any]]:
         """Yield the placements with their figures, for the record."""
@@ -216,7 +183,7 @@ class StudiedType:
                     "count": placed.count,
                     "kind": kind,
                     "poses": poses.tolist(),
-                    "sensors": [sensor.xyz.tolist() for sensor in placed.configurations[number].sensors],
+                    "sensors": [sensor.xyz.tolist() for sensor in placed.mounted[number].sensors],
                     "criteria": {one.key: one.value(poses) for one in self.criteria},
                     "average_precision": {
                         name: evaluations[number].average_precision for name, evaluations in evaluated.items()
@@ -247,17 +214,11 @@ def study_type(
     known, tests = runs
     criteria = yield from site_criteria(survey, known, settings.criteria)
     placed = yield from choose_placements(survey, criteria, settings)
-    everything = [one for some in placed for one in some.configurations]
+    everything = [one for some in placed for one in some.mounted]
     shared = SharedScans(simulator, everything)
     found = iter((yield from detect_with_all(shared, tests, detector, folder)))
-    frames = tuple(tuple(next(found) for _ in some.configurations) for some in placed)
+    frames = tuple(tuple(next(found) for _ in some.mounted) for some in placed)
     return StudiedType(survey.site.name, next(iter(survey.models)), criteria, placed, frames)
-
-
-def _spearman(values: Float, precise: Precisions) -> IntervalEstimate:
-    """Return the rank correlation, NaN for fewer than `MIN_PLACEMENTS`: so few say nothing of it."""
-    few = len(values) < MIN_PLACEMENTS
-    return IntervalEstimate(math.nan, -math.inf, math.inf) if few else correlate(values, precise)
 
 
 def precision_of(evaluation: Evaluation) -> IntervalEstimate:
@@ -285,48 +246,34 @@ def difference_of(one: Evaluation, other: Evaluation) -> IntervalEstimate:
     return IntervalEstimate(value, value - reach, value + reach)
 
 
-def record_of(rows: Sequence[Mapping[str, Any]]) -> list[list[object]]:
-    """Return the cells of a CSV table of rows as `row_record` returns them."""
+def _parts(name: str, estimate: IntervalEstimate) -> dict[str, float | None]:
+    """Return a figure with the ends of its interval as columns, None for open ends."""
+    parts = {name: estimate.value, f"{name}_low": estimate.low, f"{name}_high": estimate.high}
+    return {column: number if math.isfinite(number) else None for column, number in parts.items()}
+
+
+def table_cells(rows: Sequence[Mapping[str, Any]]) -> list[list[object]]:
+    """Return the cells of a CSV table of rows."""
     return [
         [f"{value:.4f}" if isinstance(value, float) else "" if value is None else value for value in row.values()]
         for row in rows
     ]
 
 
-def row_record(row: Row) -> dict[str, Any]:
-    """Return a row as plain values, None for an open end of an interval."""
-    record: dict[str, Any] = {}
-    for name, value in vars(row).items():
-        if not isinstance(value, IntervalEstimate):
-            record[name] = value
-            continue
-        record |= {
-            name if part == "value" else f"{name}_{part}": number if math.isfinite(number) else None
-            for part, number in asdict(value).items()
-        }
-    return record
-
-
 def table_lines(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
     """Yield the lines of a compact table: one for each criterion in each cell, with all classes."""
     heads = [f"{name}: Spearman, gain in points" for name in dict.fromkeys(row["road_users"] for row in rows)]
-    yield f"{'site, sensors, criterion':48} " + " ".join(f"{head:>42}" for head in heads)
+    yield f"{'site, sensors, criterion':48} " + " ".join(f"{head:>36}" for head in heads)
     cells = dict.fromkeys((row["site"], row["sensor"], row["count"], row["criterion"]) for row in rows)
     for cell in cells:
         own = [row for row in rows if (row["site"], row["sensor"], row["count"], row["criterion"]) == cell]
         site, sensor, count, criterion = cell
         name = f"{site[:20]}, {count} × {sensor}, {criterion}"
-        yield f"{name:48} " + " ".join(f"{_figures(row):>42}" for row in own)
+        yield f"{name:48} " + " ".join(f"{_figures(row):>36}" for row in own)
 
 
 def _figures(row: Mapping[str, Any]) -> str:
-    gain = _interval(row, "gain", 100.0, "+.1f")
-    return f"{_interval(row, 'spearman', 1.0, '+.2f')}, {gain}"
-
-
-def _interval(row: Mapping[str, Any], name: str, scale: float, form: str) -> str:
-    value, low, high = (row[f"{name}{end}"] for end in ("", "_low", "_high"))
-    if value is None:
-        return "none"
-    between = "" if low is None or high is None else f" [{scale * low:{form}}, {scale * high:{form}}]"
-    return f"{scale * value:{form}}{between}"
+    value, low, high = (row[f"gain{end}"] for end in ("", "_low", "_high"))
+    between = "" if low is None else f" [{100 * low:+.1f}, {100 * high:+.1f}]"
+    spearman = "none" if row["spearman"] is None else f"{row['spearman']:+.2f}"
+    return f"{spearman}, {100 * value:+.1f}{between}"

@@ -18,7 +18,6 @@ from seip_addon.core.sensing.visibility.ray_casting import make_ray_caster
 from seip_addon.core.workflows.returns import survey_returns
 from seip_addon.core.workflows.survey import Survey
 
-from .occupancy import vehicle_occupancy
 from .pose_criteria import (
     InfrastructureScore,
     LogReturns,
@@ -30,7 +29,7 @@ from .pose_criteria import (
     entropy_guided_visibility,
 )
 from .vehicle_grid import log_misses, vehicles_in
-from .voxels import TrafficInstant, Voxels, seen_voxels, voxel_occupancy
+from .voxels import TrafficInstant, Voxels, seen_voxels, vehicle_occupancy, voxel_occupancy
 
 OF_LITERATURE = ("egvs", "inspe", "pe_vgop")
 CRITERIA = ("coverage", "returns", "occupancy_entropy", *OF_LITERATURE)

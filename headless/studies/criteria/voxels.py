@@ -1,8 +1,9 @@
-"""Voxels over a site's targets: how often road users occupy them, and which of them sensors see."""
+"""Voxels over a site's targets: how often road users occupy them and the targets, and which of them sensors see."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from headless.detection.matching import VEHICLES
 from headless.detection.recordings import SampledRun
 
 import numpy as np
@@ -15,8 +16,9 @@ from seip_addon.core.sensing.traffic.trajectories import Snapshot, Trajectories
 from seip_addon.core.sensing.visibility.ray_casting import RayCaster, make_ray_caster
 from seip_addon.core.site.site import Targets
 
-from .occupancy import INTERVAL
+from .vehicle_grid import Vehicles
 
+INTERVAL = 0.5  # seconds between the instants at which occupancy is looked at
 LAYER_HEIGHT = 1.0  # metres
 LAYERS = 2  # up to the height of most road users
 LIKELY = 0.5  # chance of a return from which on a beam counts as one that returns
@@ -25,7 +27,6 @@ MARGIN = 1e-3  # metres by which a ray may end before a voxel's middle: engines 
 # The triangles of a box from its corners (4 z + 2 y + x), two on each side.
 _BOX_SIDES = np.array([[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]])
 _BOX_TRIANGLES = _BOX_SIDES[:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3)
-_CORNERS = np.array([(x, y, z) for z in (0, 1) for y in (-0.5, 0.5) for x in (-0.5, 0.5)])
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,6 +81,28 @@ def voxel_occupancy(voxels: Voxels, runs: Sequence[SampledRun]) -> Float:
     return held / instants
 
 
+def vehicle_occupancy(targets: Targets, runs: Sequence[SampledRun]) -> Float:
+    """Return the share of time for which a vehicle stands on each target's square, (t,).
+
+    A vehicle stands on a square whose middle its box holds when it is enlarged by half the spacing on each side.
+    """
+    held, instants = np.zeros(len(targets), dtype=np.int64), 0
+    for run in runs:
+        users = run.trajectories.users
+        reach = np.array([(user.length, user.width) for user in users]) / 2 + targets.spacing / 2
+        vehicle = np.array([user.category in VEHICLES for user in users])
+        for time in np.arange(run.times[0], run.trajectories.span[1], INTERVAL).tolist():
+            now = run.trajectories.at(time)
+            here = vehicle[now.user]
+            offset = targets.xyz[None, :, :2] - now.position[here, None, :2]
+            cos, sin = np.cos(now.yaw[here])[:, None], np.sin(now.yaw[here])[:, None]
+            along, across = cos * offset[..., 0] + sin * offset[..., 1], cos * offset[..., 1] - sin * offset[..., 0]
+            most = reach[now.user[here]]
+            held += ((np.abs(along) <= most[:, :1]) & (np.abs(across) <= most[:, 1:])).any(axis=0)
+            instants += 1
+    return held / instants
+
+
 @dataclass(frozen=True, eq=False)
 class TrafficInstant:
     """The boxes of the road users of an instant, as what hides voxels.
@@ -99,11 +122,9 @@ class TrafficInstant:
     def of(cls, voxels: Voxels, trajectories: Trajectories, now: Snapshot) -> "TrafficInstant":
         """Return the road users of an instant."""
         users = [trajectories.users[number] for number in now.user]
-        boxes = [
-            _box((user.length, user.width, user.height), place, float(yaw))
-            for user, place, yaw in zip(users, now.position, now.yaw, strict=True)
-        ]
-        caster = make_ray_caster(np.concatenate(boxes)) if boxes else None
+        sizes = np.array([(user.length, user.width, user.height) for user in users]).reshape(-1, 3)
+        corners = Vehicles(now.position, now.yaw, sizes).corners
+        caster = make_ray_caster(corners[:, _BOX_TRIANGLES].reshape(-1, 3, 3)) if users else None
         return cls(caster, voxels.occupant(trajectories, now))
 
     def leaves(self, origin: Float, directions: Float, distance: Float) -> Boolean:
@@ -174,14 +195,3 @@ def seen_voxels(
     passed[ends] = 1.0 - (1.0 - np.minimum(chance, 1.0)) ** beams >= LIKELY
     unhidden = np.array([free & instant.leaves(origin, directions, distance) for instant in instants])
     return SeenVoxels(covered, free, passed, unhidden.reshape(len(instants), len(voxels)))
-
-
-def _box(size: tuple[float, float, float], place: Float, yaw: float) -> Float:
-    """Return the triangles of an upright box that stands on a place, (12, 3, 3)."""
-    corners = _CORNERS * size
-    cos, sin = np.cos(yaw), np.sin(yaw)
-    turned = np.column_stack(
-        [cos * corners[:, 0] - sin * corners[:, 1], sin * corners[:, 0] + cos * corners[:, 1], corners[:, 2]]
-    )
-    triangles: Float = (turned + place)[_BOX_TRIANGLES]
-    return triangles

@@ -6,8 +6,8 @@ per seed on all placements at once; `evaluate_all` evaluates each detector with 
 """
 
 import math
-from collections.abc import Generator, Iterable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Generator, Sequence
+from dataclasses import dataclass, field, replace
 from itertools import chain, combinations
 from pathlib import Path
 
@@ -21,12 +21,14 @@ from headless.detection.rules import MAIN_RULE
 from headless.detection.settings import NetworkSettings, TrainingSettings
 from headless.detection.training import LearningCurve, TrainedDetector, deterministic, train
 from headless.studies.coverage.cells import COUNTS, Case, Cell, solve_cell
-from headless.studies.detection.sensor_configuration import SensorConfiguration
-from headless.studies.false_positives import false_positives
+
+import numpy as np
 
 from seip_addon.core.base.arrays import Float
 from seip_addon.core.base.errors import SeipError
 from seip_addon.core.base.progress import Progress, within
+from seip_addon.core.choosing.placement.deployment import Deployment
+from seip_addon.core.sensing.scans.sensor import MountedSensor
 from seip_addon.core.sensing.traffic.run_overlap import require_independent, vehicle_positions
 from seip_addon.core.workflows.survey import Survey
 
@@ -35,12 +37,14 @@ from .claims import SeedResult
 MIN_RUNS = 4  # one for training, one for validation, two for tests
 STILL_RISING = 0.02  # lead in average precision of the last validation above which training has not converged
 RUNS_PER_TEST, RUNS_PER_VALIDATION = 2, 8  # one run in 2 is for tests, one in 8 for validation
-RUNS_PER_CRITERIA = 4  # without training, one run in 4 is for criteria that use traffic, the others for tests
 
 SPLIT = "the last half is for tests, an eighth before it (at least one) for validation, the others for training"
 """Split of the runs, as a message."""
 
 TEST_STRIDE = 2  # only every second frame is tested, as successive frames are similar
+
+TrainingSet = tuple[list[SampledRecording], list[SampledRecording]]
+"""Training and validation recordings of all sensor configurations."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,18 +107,32 @@ def read_traffic(paths: Sequence[Path], origin: Float, every: float) -> Traffic:
     return Traffic(runs[:training], sparse[:-tests], sparse[-tests:])
 
 
-def split_untrained(runs: Sequence[SampledRun]) -> tuple[tuple[SampledRun, ...], tuple[SampledRun, ...]]:
-    """Split runs where nothing is trained: the first quarter (at least one) for criteria, the others for tests.
+@dataclass(frozen=True, eq=False)
+class SensorConfiguration(MountedSensors):
+    """Sensors of one type with the largest coverage.
 
-    Raises
-    ------
-    SeipError
-        There are too few runs.
+    Parameters
+    ----------
+    sensors : tuple of MountedSensor
+        Sensors of the deployment.
+    sensor : str
+        Type, by which charts and tables group it.
+    count : int
+        N, the requested number of sensors.
     """
-    if len(runs) < MIN_RUNS:
-        raise SeipError(f"{len(runs)} runs of traffic are too few: make {MIN_RUNS} or more with seip traffic")
-    count = max(1, len(runs) // RUNS_PER_CRITERIA)
-    return tuple(runs[:count]), tuple(runs[count:])
+
+    sensors: tuple[MountedSensor, ...] = field(init=False)
+    deployment: Deployment
+    sensor: str
+    count: int
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "sensors", self.deployment.sensors)
+
+    @classmethod
+    def of_case(cls, case: Case) -> "SensorConfiguration":
+        """Return the configuration of a solved cell."""
+        return cls(f"{case.count} × {case.sensor}", case.deployment, case.sensor, case.count)
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,7 +159,7 @@ class DetectorOutcome:
     @property
     def seed_result(self) -> SeedResult:
         """Figures of this outcome for the claims."""
-        configuration, false = self.configuration, false_positives(self.evaluation, self.score)
+        configuration, (false, sparse) = self.configuration, false_positives(self.evaluation, self.score)
         return SeedResult(
             sensor=configuration.sensor,
             count=configuration.count,
@@ -149,8 +167,8 @@ class DetectorOutcome:
             average_precision=self.evaluation.average_precision,
             price=configuration.deployment.price,
             coverage=configuration.deployment.coverage,
-            false_positives=false.per_frame,
-            sparse=false.sparse,
+            false_positives=false,
+            sparse=sparse,
             still_rising=self.still_rising,
         )
 
@@ -175,37 +193,21 @@ def place_all(survey: Survey) -> Generator[Progress, None, tuple[SensorConfigura
     return tuple(map(SensorConfiguration.of_case, cases))
 
 
-@dataclass(frozen=True, eq=False)
-class TrainingSet:
-    """Training and validation recordings of all sensor configurations."""
-
-    training: list[SampledRecording]
-    validation: list[SampledRecording]
-
-
 def simulate_training_set(
     simulator: Simulator, configurations: Sequence[SensorConfiguration], traffic: Traffic, network: NetworkSettings
 ) -> Generator[Progress, None, TrainingSet]:
-    """Simulate training and validation frames of all configurations, and store them as samples for a network."""
+    """Simulate training and validation frames of all configurations as samples for a network."""
     area = simulator.area(network.pillar)
 
     def samples(configuration: SensorConfiguration, runs: Sequence[SampledRun]) -> list[SampledRecording]:
         return [SampledRecording(recorded(simulator, configuration, run), area, network.most_points) for run in runs]
 
-    training = {one.name: samples(one, traffic.training) for one in configurations}
-    validation = {one.name: samples(one, traffic.validation) for one in configurations}
-    ordered = most_rays_first(configurations)
-    yield from side_by_side([simulate_all([*training[one.name], *validation[one.name]]) for one in ordered], AT_ONCE)
-    return TrainingSet(list(chain(*training.values())), list(chain(*validation.values())))
-
-
-def most_rays_first(configurations: Iterable[SensorConfiguration]) -> list[SensorConfiguration]:
-    """Return configurations in descending number of rays, so that no core is left with a long one at the end."""
-
-    def rays(configuration: SensorConfiguration) -> int:
-        return sum(sensor.model.channels * sensor.model.azimuth_count for sensor in configuration.sensors)
-
-    return sorted(configurations, key=rays, reverse=True)
+    training, validation = (
+        [samples(one, runs) for one in configurations] for runs in (traffic.training, traffic.validation)
+    )
+    works = [simulate_all([*some, *others]) for some, others in zip(training, validation, strict=True)]
+    yield from side_by_side(works, AT_ONCE)
+    return list(chain(*training)), list(chain(*validation))
 
 
 def recorded(simulator: Simulator, configuration: MountedSensors, run: SampledRun) -> Recording:
@@ -250,8 +252,7 @@ def train_all(  # noqa: PLR0913  # what a training depends on
     """
     trainings = [
         train(
-            training_set.training,
-            training_set.validation,
+            *training_set,
             network,
             replace(training, seed=seed),
             device=device,
@@ -284,16 +285,14 @@ def evaluate_all(
     threads : int
         CPU threads of torch; their number affects the exact result.
     """
-    ordered, runs = most_rays_first(configurations), (*traffic.validation, *traffic.test)
-    detectors = [one.detector for one in trained]
-    detections = [detect_in_runs(simulator, one, runs, detectors, threads) for one in ordered]
+    runs, detectors = (*traffic.validation, *traffic.test), [one.detector for one in trained]
+    detections = [detect_in_runs(simulator, one, runs, detectors, threads) for one in configurations]
     with deterministic(threads):  # around all detections, as torch has one setting for all threads
         results = yield from side_by_side(detections, AT_ONCE)
-    by_name = {one.name: frames for one, frames in zip(ordered, results, strict=True)}
     validated = sum(len(run.times) for run in traffic.validation)
     outcomes = []
     for number, detector in enumerate(trained):
-        frames = [by_name[one.name][number] for one in configurations]
+        frames = [by_detector[number] for by_detector in results]
         # one score for each detector, whatever the sensors
         score = balanced_score(evaluate(list(chain(*(some[:validated] for some in frames))), MAIN_RULE))
         for configuration, some in zip(configurations, frames, strict=True):
@@ -309,3 +308,21 @@ def evaluate_all(
                 )
             )
     return outcomes
+
+
+def false_positives(evaluation: Evaluation, score: float) -> tuple[float, float]:
+    """Count the false detections with at least some score.
+
+    Returns
+    -------
+    per_frame : float
+    sparse : float, 0 to 1
+        Share of them that lie where the cloud is sparser than around half of the hits; chance alone gives a half.
+        NaN without false detections or without hits.
+    """
+    detections = evaluation.detections
+    counted = detections.score >= score
+    false, hits = ~detections.hit & counted, detections.density[detections.hit & counted]
+    known = false.any() and len(hits)
+    sparse = float((detections.density[false] < np.median(hits)).mean()) if known else np.nan
+    return float(false.sum()) / len(evaluation.run), sparse

@@ -6,18 +6,23 @@ lies outside, and is undecided otherwise. "About" a published figure means from 
 undecided if the average precision is below `LEAST_PRECISION`, or if it was still rising when the training ended.
 """
 
+import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 from headless.studies.claims import UNDECIDED, Claim, verdict_above, verdict_within, worst_verdict
 from headless.studies.coverage.cells import COUNTS
-from headless.studies.mean_over_seeds import ANYTHING, CHANGE_OF_SHARE, COUNT, mean_interval
 
 import numpy as np
 
 from seip_addon.core.base.arrays import Float
 from seip_addon.core.base.counts import counted
-from seip_addon.core.base.estimates import SHARE, Interval
+from seip_addon.core.base.errors import SeipError
+from seip_addon.core.base.estimates import SHARE, Interval, student_reach
+
+ANYTHING: Interval = (-math.inf, math.inf)  # range of a figure without bounds
+COUNT: Interval = (0.0, math.inf)
+CHANGE_OF_SHARE: Interval = (-1.0, 1.0)
 
 FACTOR = 2.0  # largest ratio of two figures that are "about" the same
 MIN_SEEDS = 3  # seeds below which nothing is decided
@@ -207,3 +212,28 @@ class _Mean:
             return "not measured"
         between = "" if self.interval is None else f" ({figure(self.interval[0])} to {figure(self.interval[1])})"
         return f"{figure(self.value)}{unit}{between}"
+
+
+def mean_interval(values: Sequence[float], possible: Interval = ANYTHING) -> Interval:
+    """Return the 95 % interval of the mean over repetitions (seeds); see `student_reach`.
+
+    Impossible values are cut off, which does not change the probability that the interval contains the mean.
+
+    Parameters
+    ----------
+    values : sequence of float
+        Values of the repetitions.
+    possible : (float, float)
+        Least and largest possible value of the figure.
+
+    Raises
+    ------
+    SeipError
+        There are fewer than two values.
+    """
+    if len(values) < 2:
+        raise SeipError(
+            f"{len(values)} seed gives no interval: repeat the study with at least two, better three or more"
+        )
+    mean, reach = float(np.mean(values)), student_reach(values)
+    return max(mean - reach, possible[0]), min(mean + reach, possible[1])

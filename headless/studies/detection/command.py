@@ -16,14 +16,13 @@ from headless.detection.average_precision import too_few_runs
 from headless.detection.detector import SHIPPED_DETECTOR, Detector, check_device
 from headless.detection.recordings import Simulator
 from headless.detection.settings import NetworkSettings, TrainingSettings
-from headless.options import new_parser, real_number, whole_number
+from headless.options import real_number, whole_number
 from headless.studies.claims import save_claims
 from headless.studies.coverage.cells import COUNTS
 from headless.studies.detection import case_study
 from headless.studies.detection.claims import detection_claims
 from headless.studies.detection.results import StudyResults, describe, save_charts, save_table
-from headless.studies.detection.sensor_configuration import SensorConfiguration
-from headless.studies.survey_options import add_rolling_shutter, add_survey_options
+from headless.studies.survey_options import study_parser
 
 from seip_addon.core.base.limits import TIME_STEP, Limits
 from seip_addon.core.choosing.placement.objective import Objective, check_objective
@@ -85,13 +84,13 @@ def prepare_site(options: argparse.Namespace) -> DetectionSite:
         require_own_traffic(run.trajectories, surveyed.geometry, run.name)
     runtime.LOG.info(traffic.overlap())
     runtime.warn(filter(None, [too_few_runs(len(traffic.test))]))
-    scans = ScanSettings(rolling_shutter=options.rolling_shutter)
+    scans = ScanSettings(rolling_shutter=True)
     return DetectionSite(surveyed, watch, traffic, Simulator(surveyed.geometry, scans))
 
 
 def run_study(  # noqa: PLR0913  # a site, its placements, and how detectors are trained
     site: DetectionSite,
-    configurations: tuple[SensorConfiguration, ...],
+    configurations: tuple[case_study.SensorConfiguration, ...],
     folder: Path,
     *,
     training: TrainingSettings,
@@ -114,8 +113,7 @@ def run_study(  # noqa: PLR0913  # a site, its placements, and how detectors are
 
 
 def add_options(parser: argparse.ArgumentParser) -> argparse._ArgumentGroup:
-    """Add the options of a survey and of trainings to a command; return the group of the latter."""
-    add_survey_options(parser)
+    """Add the options of traffic and of trainings to a command; return their group."""
     detection = parser.add_argument_group("detection")
     detection.add_argument(
         "--traffic",
@@ -126,7 +124,6 @@ def add_options(parser: argparse.ArgumentParser) -> argparse._ArgumentGroup:
         help=f"runs of traffic: {case_study.SPLIT} (those in the folder SCENE_traffic next to the scene)",
     )
     add_training_options(detection)
-    add_rolling_shutter(detection)
     return detection
 
 
@@ -152,7 +149,7 @@ def add_training_options(group: argparse._ArgumentGroup) -> None:
 
 def _parser() -> argparse.ArgumentParser:
     what = "Find out what 1, 2 and 4 sensors of each type detect; name types from the simplest to the best."
-    parser = new_parser("study detection", what)
+    parser = study_parser("detection", what)
     add_options(parser).add_argument(
         "--from-scratch",
         action="store_true",

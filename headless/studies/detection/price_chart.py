@@ -9,33 +9,23 @@ from typing import Any
 from headless.charts.detection import (
     PANEL_SIZE,
     PRECISION_LABEL,
-    check_drawn,
     mark_style,
-    placement_name,
 )
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, NullFormatter
 
-from seip_addon.core.base.arrays import Float
 from seip_addon.core.base.estimates import Interval
 from seip_addon.core.output.pictures.chart_style import (
     DASHED,
-    FAINT_COLOUR,
     add_legend,
     colour,
     new_figure,
     set_title,
     style_axes,
 )
-from seip_addon.core.output.pictures.drawing import save_png
-from seip_addon.core.output.pictures.labels import place_callouts
-from seip_addon.core.output.pictures.palette import INK, PAPER, SOFT_INK
-
-LABEL: dict[str, Any] = {"size": 8.0, "color": INK, "ha": "center", "va": "center", "zorder": 5, "parse_math": False}
+from seip_addon.core.output.pictures.drawing import draw_callouts, save_png
+from seip_addon.core.output.pictures.palette import SOFT_INK
 
 
 @dataclass(frozen=True)
@@ -71,12 +61,11 @@ class PrecisionCell:
     @property
     def name(self) -> str:
         """Name in charts."""
-        return placement_name(self.count, self.sensor)
+        return f"{self.count} × {self.sensor}"
 
 
 def save_price_chart(path: str | os.PathLike[str], cells: Sequence[PrecisionCell], title: str) -> None:
-    """Draw average precision against price, with the front named, as PNG."""
-    check_drawn(cells, "average precision against price")
+    """Draw average precision against price, with its front, as PNG."""
     figure, (panel,) = new_figure(PANEL_SIZE[0] * 1.25, PANEL_SIZE[1])
     for row, sensor in enumerate(dict.fromkeys(cell.sensor for cell in cells)):
         own = [cell for cell in cells if cell.sensor == sensor]
@@ -111,7 +100,11 @@ def save_price_chart(path: str | os.PathLike[str], cells: Sequence[PrecisionCell
     style_axes(panel, "price of all sensors", PRECISION_LABEL, "y")
     add_legend(figure, [panel])
     set_title(figure, title)
-    _name(figure, panel, cells, best)
+    panel.set_xlim(panel.get_xlim())  # lines to names must not change the limits
+    figure.draw_without_rendering()  # fixes positions and limits of the panel, in which the names are placed
+    figure.set_layout_engine("none")
+    points = np.array([(cell.price, cell.mean) for cell in cells])
+    draw_callouts(panel, points, [cell.name for cell in cells], points, zorder=5)
     save_png(path, figure)
 
 
@@ -122,36 +115,3 @@ def _front(cells: Sequence[PrecisionCell]) -> list[PrecisionCell]:
         if not best or cell.mean > best[-1].mean:
             best.append(cell)
     return best
-
-
-def _name(figure: Figure, panel: Axes, cells: Sequence[PrecisionCell], best: Sequence[PrecisionCell]) -> None:
-    """Write the name of each cell next to its mark, without overlaps; those of the front in bold."""
-    figure.draw_without_rendering()  # fixes the positions and limits of panels, which names are placed by
-    figure.set_layout_engine("none")
-    texts = [
-        panel.text(cell.price, cell.mean, cell.name, weight="bold" if cell in best else "normal", **LABEL)
-        for cell in cells
-    ]
-    extents = [text.get_window_extent() for text in texts]
-    sizes = np.array([(extent.width, extent.height) for extent in extents])
-    points = panel.transData.transform([(cell.price, cell.mean) for cell in cells])
-    radius, frame = 4.0 * figure.dpi / 72, panel.get_window_extent()
-    lines = np.concatenate([_along(panel, line) for line in panel.get_lines()])
-    centres = place_callouts(points, sizes, frame.extents, radius, lines)
-    back = panel.transData.inverted()
-    for text, point, centre, size in zip(texts, points, centres, sizes, strict=True):
-        text.set(x=back.transform(centre)[0], y=back.transform(centre)[1])
-        gap = np.maximum(np.abs(point - centre) - size / 2, 0)
-        if np.hypot(*gap) > 2.5 * radius:  # so far that the name could be attributed to another mark
-            panel.plot(*back.transform([point, centre]).T, color=FAINT_COLOUR, linewidth=0.7, zorder=1)
-            text.set_bbox({"facecolor": PAPER, "edgecolor": "none", "pad": 0.8})
-
-
-def _along(panel: Axes, line: Line2D) -> Float:
-    """Return points along a drawn line in pixels, (n, 2) float64."""
-    corners: Float = panel.transData.transform(line.get_xydata())
-    corners = corners[np.isfinite(corners).all(axis=1)]
-    if len(corners) < 2:
-        return corners
-    along: Float = np.linspace(corners[:-1], corners[1:], 20).reshape(-1, 2)
-    return along

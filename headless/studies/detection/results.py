@@ -9,8 +9,7 @@ from headless.charts.error_view import save_error_view
 from headless.detection.recordings import Simulator
 from headless.detection.rules import MAIN_RULE, RULES, precisions
 from headless.detection_results import error_view
-from headless.studies.mean_over_seeds import mean_interval
-from headless.studies.rank_correlation import rank_agreements
+from headless.studies.rank_correlation import rank_correlation
 
 import numpy as np
 
@@ -18,6 +17,7 @@ from seip_addon.core.base.estimates import SHARE, Interval
 from seip_addon.core.storage.csv_table import save_csv
 
 from .case_study import DetectorOutcome, Traffic
+from .claims import mean_interval
 from .price_chart import PrecisionCell, save_price_chart
 
 _NO_ENDS = (math.nan, math.nan)
@@ -117,7 +117,7 @@ def describe(results: StudyResults) -> Iterator[str]:
         )
         yield f"  {_by_rules(results, cell.name)}"
     coverage, precision = np.array([(cell.coverage, cell.mean) for cell in results.cells]).T
-    yield f"rank correlation of coverage and AP: {rank_agreements(coverage, precision)[0]:.2f}"
+    yield f"rank correlation of coverage and AP: {rank_correlation(coverage, precision):.2f}"
 
 
 def _by_rules(results: StudyResults, name: str) -> str:

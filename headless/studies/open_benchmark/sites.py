@@ -5,10 +5,10 @@ from __future__ import annotations
 import hashlib
 import tomllib
 from collections.abc import Generator
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
 
-from headless.studies.random_sites.production import SiteSettings, make_site
+from headless.studies.random_sites.production import APPROACHES, SiteSettings, make_site
 
 import bpy
 
@@ -23,8 +23,8 @@ from seip_addon.scene.build import build_scene
 from seip_addon.scene.read import read_scene
 
 SITES = Path(__file__).with_name("sites.toml")
-SEED, APPROACHES = 2026, 60.0
-"""Seed of the random sites, and length of the streets in the regions (metres)."""
+SEED = 2026
+"""Seed of the random sites."""
 RUNS, DURATION = 8, 40.0
 """Number of runs of traffic at each site, and their duration (seconds)."""
 
@@ -60,23 +60,9 @@ class BenchmarkSite:
     pedestrians: float = 0.0
 
 
-def read_sites(path: Path = SITES) -> tuple[BenchmarkSite, ...]:
-    """Read the junctions of the benchmark.
-
-    Raises
-    ------
-    SeipError
-        A site has an unknown entry, or is neither real nor random.
-    """
-    known = {one.name for one in fields(BenchmarkSite)}
-    sites = []
-    for entry in tomllib.loads(path.read_text(encoding="utf-8"))["site"]:
-        unknown = entry.keys() - known
-        if unknown or bool(entry.get("extract")) == bool(entry.get("number")):
-            fault = f"has the unknown entry {min(unknown)!r}" if unknown else "needs either an extract or a number"
-            raise SeipError(f"{path}: site {entry.get('name', '?')} {fault}")
-        sites.append(BenchmarkSite(**entry))
-    return tuple(sites)
+def read_sites() -> tuple[BenchmarkSite, ...]:
+    """Read the junctions of the benchmark."""
+    return tuple(BenchmarkSite(**entry) for entry in tomllib.loads(SITES.read_text(encoding="utf-8"))["site"])
 
 
 def build_benchmark_site(site: BenchmarkSite, folder: Path, extracts: Path) -> Generator[Progress, None, Path]:
@@ -95,9 +81,7 @@ def build_benchmark_site(site: BenchmarkSite, folder: Path, extracts: Path) -> G
     folder.mkdir(parents=True, exist_ok=True)
     scene = folder / "site.blend"
     if site.number:
-        settings = SiteSettings(
-            SEED, RUNS, DURATION, approaches=APPROACHES, tram=site.tram, pedestrians=site.pedestrians
-        )
+        settings = SiteSettings(SEED, RUNS, DURATION, tram=site.tram, pedestrians=site.pedestrians)
         yield from make_site(folder, settings, site.number)
         return scene
     traffic = traffic_folder(scene)

@@ -11,7 +11,7 @@ from itertools import chain
 from pathlib import Path
 from typing import Any
 
-from headless.studies.rank_correlation import rank_agreements
+from headless.studies.rank_correlation import rank_correlation
 
 import numpy as np
 
@@ -149,7 +149,7 @@ def score(path: Path, table: Placements, values: Mapping[str, Float]) -> list[Cr
                 continue
             precision = numbers(path, rows, column)
             # The correlation of a constant criterion is undefined; it counts as zero, as it ranks nothing.
-            correlations.append(float(np.nan_to_num(rank_agreements(own, precision)[0])))
+            correlations.append(float(np.nan_to_num(rank_correlation(own, precision))))
             losses.append(float(precision.max() - precision[int(np.argmax(own))]))
         if correlations:
             figures = (mean_over_sites(np.array(each)) for each in (correlations, losses))

@@ -1,1 +1,1 @@
-"""The paper's own case study, reproduced: published figures and claims, traffic with its demand, and the page."""
+"""The paper's own case study, reproduced on its map: published figures and claims, and the page."""

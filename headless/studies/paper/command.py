@@ -1,11 +1,10 @@
-"""Reproduce the paper's own case study on a map and traffic of the user, and write a page that compares the figures.
+"""Reproduce the paper's own case study on a map of the user, and write a page that compares the figures.
 
-seip study paper MAP.xodr --junction 965 --routes FILE.rou.xml --types vtypes.rou.xml \
-    --network FILE.net.xml -o docs
-blender -b --python-exit-code 1 -P headless/study.py -- paper MAP.xodr --junction 965 … -o docs
+seip study paper Town05.xodr --junction 965 -o docs
+blender -b --python-exit-code 1 -P headless/study.py -- paper Town05.xodr --junction 965 -o docs
 
-Needs torch (make detection) and SUMO (make sumo). Trained detectors are stored in the work folder: rerun the command
-to resume.
+Needs torch (make detection), and SUMO (make sumo) unless runs of traffic are given. Trained detectors are stored in the
+work folder: rerun the command to resume.
 """
 
 import argparse
@@ -19,21 +18,11 @@ from headless.studies.coverage.cells import COUNTS, CoverageStudy, coverage_stud
 from headless.studies.coverage.charts import save_height_chart
 from headless.studies.coverage.claims import coverage_claims
 from headless.studies.detection import command as detection
-from headless.studies.detection.case_study import MIN_RUNS
+from headless.studies.detection.case_study import MIN_RUNS, SensorConfiguration
 from headless.studies.detection.claims import detection_claims
 from headless.studies.detection.results import StudyResults
-from headless.studies.detection.sensor_configuration import SensorConfiguration
-from headless.studies.paper.page import PlacementFigures, page
-from headless.studies.paper.published import HEIGHTS
-from headless.studies.paper.route_file import RouteDemand
-from headless.studies.paper.traffic_runs import (
-    MOST_OVERLAP,
-    WARM_UP,
-    TrafficSource,
-    make_runs,
-    overlaps,
-    read_demand_of_site,
-)
+from headless.studies.paper.page import HEIGHTS, PlacementFigures, page
+from headless.studies.survey_options import study_parser
 
 import bpy
 import numpy as np
@@ -42,11 +31,13 @@ from seip_addon.core.base.counts import counted
 from seip_addon.core.base.errors import SeipError
 from seip_addon.core.base.limits import Limits
 from seip_addon.core.programs.sumo_programs import find_sumo
-from seip_addon.core.sensing.traffic.run_overlap import MATCH_RADIUS
 from seip_addon.core.site.candidates import PAPER_TYPES
 from seip_addon.core.site.scene_geometry import SceneGeometry
 from seip_addon.core.storage.files import whole_file
 from seip_addon.core.workflows.survey import Survey
+from seip_addon.core.workflows.traffic_runs import traffic_folder
+from seip_addon.core.workflows.traffic_simulation import SimulationSettings, simulate_runs
+from seip_addon.core.world.traffic_simulation.demand import Demand
 from seip_addon.scene.read import read_scene
 
 CHART = "pictures/paper_heights.png"
@@ -57,8 +48,9 @@ def main(argv: list[str]) -> None:
     """Build the scene, draw traffic, place, train, evaluate, and write the page."""
     options = _parser().parse_args(argv)
     training = TrainingSettings() if options.steps is None else TrainingSettings(steps=options.steps)
-    find_sumo()
-    for path in (options.map, options.routes, *options.types, options.network):
+    if not options.traffic:
+        find_sumo()
+    for path in (options.map, *options.traffic):
         if not path.is_file():
             raise SeipError(f"there is no file {path}: check its path")
     for folder in (options.work, options.output / "pictures"):
@@ -66,9 +58,7 @@ def main(argv: list[str]) -> None:
 
     scene = options.work / "site.blend"
     geometry = _built(options, scene)
-    source = TrafficSource(options.routes, tuple(options.types), options.network)
-    demand = runtime.finish_with_bar(read_demand_of_site(source, geometry, options.map.name))
-    runs = runtime.finish_with_bar(make_runs(scene, source, demand, geometry, options.runs, options.duration))
+    runs = options.traffic or _simulated(options, scene, geometry)
     site = detection.prepare_site(_detection_options(options, scene, runs))
     surveyed, watch = site.surveyed, site.stopwatch
     limits = surveyed.settings.limits
@@ -77,7 +67,7 @@ def main(argv: list[str]) -> None:
         site, _placements(study), options.work, training=training, seeds=options.trainings, device=options.device
     )
     claims = (*coverage_claims(study), *detection_claims([one.seed_result for one in results.outcomes]))
-    facts = _facts(surveyed, demand, runs, training, options)
+    facts = _facts(surveyed, runs, training, options)
     with runtime.incomplete_if_interrupted(options.output):
         save_height_chart(options.output / CHART, study, results.name)
         text = page(_command(options), facts, study, claims, _figures(results), CHART)
@@ -99,9 +89,17 @@ def _built(options: argparse.Namespace, scene: Path) -> SceneGeometry:
     return read_scene(bpy.context.scene).geometry
 
 
+def _simulated(options: argparse.Namespace, scene: Path, geometry: SceneGeometry) -> list[Path]:
+    """Simulate runs of traffic without pedestrians next to the scene, as the paper has none."""
+    folder = traffic_folder(scene)
+    folder.mkdir(exist_ok=True)
+    settings = SimulationSettings(Demand(pedestrians=0.0), duration=options.duration)
+    return list(runtime.finish_with_bar(simulate_runs(options.map, settings, options.runs, geometry, folder)).paths)
+
+
 def _detection_options(options: argparse.Namespace, scene: Path, runs: list[Path]) -> argparse.Namespace:
     """Return the options of the detection study for the scene."""
-    parser = new_parser("study detection", "")
+    parser = study_parser("detection", "")
     detection.add_options(parser)
     arguments = [str(scene), "-o", str(options.work), "--traffic", *map(str, runs), "--every", f"{options.every:g}"]
     arguments += ["--sensor", *PAPER_TYPES, "--heights", *(f"{height:g}" for height in HEIGHTS)]
@@ -130,50 +128,43 @@ def _figures(results: StudyResults) -> list[PlacementFigures]:
 
 
 def _command(options: argparse.Namespace) -> str:
-    types = f"--types {' '.join(path.name for path in options.types)} " if options.types else ""
     steps = "" if options.steps is None else f"--steps {options.steps} "
     return (
-        f"seip study paper {options.map.name} --junction {' '.join(options.junction)} --routes {options.routes.name} "
-        f"{types}--network {options.network.name} {steps}--trainings {options.trainings} --every {options.every:g} "
-        f"--runs {options.runs} --duration {options.duration:g} --effort {options.effort:g} -o docs"
+        f"seip study paper {options.map.name} --junction {' '.join(options.junction)} {steps}"
+        f"--trainings {options.trainings} --every {options.every:g} --effort {options.effort:g} -o docs"
     )
 
 
 def _facts(
-    surveyed: Survey, demand: RouteDemand, runs: list[Path], training: TrainingSettings, options: argparse.Namespace
+    surveyed: Survey, runs: list[Path], training: TrainingSettings, options: argparse.Namespace
 ) -> dict[str, str]:
     """Return the entries of the table of differences."""
-    geometry, shares = surveyed.geometry, overlaps(runs)
+    geometry = surveyed.geometry
     hidden = (
         f"{len(geometry.occluders)} objects block the view" if geometry.occluders else "nothing on it blocks the view"
     )
+    source = "given" if options.traffic else f"of {options.duration:g} s, simulated by SUMO with this program's demand"
     return {
         "scene": f"only the OpenDRIVE map, {geometry.region.area:,.0f} m² around junction "
         f"{' '.join(options.junction)}; {hidden}",
         "criterion": f"δ = {surveyed.settings.visibility.delta:g} m, a grid of "
         f"{surveyed.settings.grid_spacing:g} m, {len(surveyed.site.candidates.position)} positions on pavements and "
         "poles",
-        "traffic": f"only SUMO, {demand.rate:,.0f} vehicles per hour in {len(demand.flows)} flows; departures, routes, "
-        f"lanes, {len(demand.models)} models and gaps are drawn randomly for each of {options.runs} runs of "
-        f"{options.duration:g} s, after a warm-up of at least {WARM_UP:g} s; {max(shares, default=0.0):.0%} of the "
-        f"vehicles of a run or less are within {MATCH_RADIUS:g} m of a vehicle of another run at the same instant "
-        f"(runs above {MOST_OVERLAP:.0%} are drawn again)",
+        "traffic": f"{len(runs)} runs {source}",
         "training": f"{training.steps} steps on frames {options.every:g} s apart, "
         f"{counted(options.trainings, 'training')}",
     }
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = new_parser(
-        "study paper", "Reproduce the paper's case study on your map and traffic, and compare the figures."
-    )
+    parser = new_parser("study paper", "Reproduce the paper's case study on your map, and compare the figures.")
     parser.add_argument("map", type=Path, help="the OpenDRIVE map (.xodr): Town05 of CARLA for the paper's case")
     parser.add_argument(
         "--junction", nargs="+", required=True, metavar="NAME", help="id, name or streets of the junction"
     )
-    parser.add_argument("--routes", type=Path, required=True, metavar="XML", help="SUMO's routes, with flows")
-    parser.add_argument("--types", nargs="+", type=Path, default=[], metavar="XML", help="files with vehicle types")
-    parser.add_argument("--network", type=Path, required=True, metavar="XML", help="network of the routes (.net.xml)")
+    parser.add_argument(
+        "--traffic", nargs="+", type=Path, default=[], metavar="NPZ", help="runs of traffic (simulated by SUMO)"
+    )
     parser.add_argument("-o", "--output", type=Path, required=True, help="folder for the page and its pictures")
     parser.add_argument(
         "--work", type=Path, default=Path("out/paper"), help="folder for finished work, from which a rerun resumes"
@@ -192,7 +183,7 @@ def _parser() -> argparse.ArgumentParser:
         help="limit of the search for each placement, in counted work",
     )
     parser.add_argument(
-        "--runs", type=whole_number(Limits(MIN_RUNS, 999)), default=16, metavar="N", help="number of runs of traffic"
+        "--runs", type=whole_number(Limits(MIN_RUNS, 999)), default=16, metavar="N", help="number of simulated runs"
     )
     parser.add_argument(
         "--duration", type=real_number(Limits(3, 3600)), default=40.0, metavar="S", help="duration of each run, seconds"

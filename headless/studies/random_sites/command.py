@@ -11,13 +11,13 @@ import time
 from pathlib import Path
 
 from headless import runtime
-from headless.options import new_parser, whole_number
+from headless.options import new_parser, real_number, whole_number
 from headless.studies.random_sites.production import SiteSettings, make_site
 
-from seip_addon.core.base.limits import Limits
+from seip_addon.core.base.limits import SEED, Limits
 from seip_addon.core.programs.sumo_programs import find_sumo
 
-SITES = Limits(1, 9999)
+SITES, RUNS, DURATION = Limits(1, 9999), Limits(1, 999), Limits(3.0, 3600.0)
 
 
 def main(argv: list[str]) -> None:
@@ -39,7 +39,13 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--sites", type=whole_number(SITES), default=8, metavar="N", help="number of sites; existing ones are kept"
     )
-    parser.add_argument("--seed", type=int, default=defaults.seed, metavar="N", help="seed of all randomness")
-    parser.add_argument("--runs", type=int, default=defaults.runs, metavar="N", help="runs of traffic on each site")
-    parser.add_argument("--duration", type=float, default=defaults.duration, metavar="S", help="duration of each run")
+    parser.add_argument(
+        "--seed", type=whole_number(SEED), default=defaults.seed, metavar="N", help="seed of all randomness"
+    )
+    parser.add_argument(
+        "--runs", type=whole_number(RUNS), default=defaults.runs, metavar="N", help="runs of traffic on each site"
+    )
+    parser.add_argument(
+        "--duration", type=real_number(DURATION), default=defaults.duration, metavar="S", help="duration of each run"
+    )
     return parser

@@ -34,6 +34,8 @@ from .street_plan import StreetPlan, draw_plan, with_tram
 from .varied_bodies import shaped
 
 SCHEMA, VERSION = "seip.training_site", 2
+APPROACHES, WARM_UP = 60.0, 80.0
+"""Length of the streets in the region of interest (metres), and simulated time before a run (seconds)."""
 MAX_ATTEMPTS = 8  # plans that are drawn for a site until one passes the check
 _PLAN, _RUN = 0, 1  # streams of random numbers of a site
 
@@ -48,10 +50,8 @@ class SiteSettings:
         Seed of all sites together.
     runs : int
         Number of runs of traffic on each site.
-    duration, warm_up : float, seconds
-        Duration of each run, and of the simulation before it.
-    approaches : float, metres
-        Length of the streets in the region of interest.
+    duration : float, seconds
+        Duration of each run.
     tram : bool
         Whether tracks of a tram lie in the main street.
     pedestrians : float, per hour and arm
@@ -61,20 +61,8 @@ class SiteSettings:
     seed: int = 0
     runs: int = 4
     duration: float = 40.0
-    warm_up: float = 80.0
-    approaches: float = 60.0
     tram: bool = False
     pedestrians: float = 0.0
-
-    def __post_init__(self) -> None:
-        if not 0 <= self.seed < 2**31:
-            raise SeipError(f"--seed must be a whole number from 0 to {2**31 - 1}, not {self.seed}")
-        if self.runs < 1:
-            raise SeipError(f"--runs must be 1 or more runs of traffic on each site, not {self.runs}")
-        if not 3.0 <= self.duration <= 3600.0 or not 0.0 <= self.warm_up <= 3600.0:
-            raise SeipError("a run lasts 3 to 3600 s (--duration), after a warm-up of 0 to 3600 s (--warm-up)")
-        if not 30.0 <= self.approaches <= 100.0:
-            raise SeipError(f"--approaches must be 30 to 100 m, not {self.approaches:g}")
 
 
 def make_site(folder: Path, settings: SiteSettings, number: int) -> Generator[Progress, None, bool]:
@@ -128,7 +116,7 @@ def _built(
         plan = draw_plan(np.random.default_rng([settings.seed, number, attempt, _PLAN]))
         plan = with_tram(plan) if settings.tram else plan
         try:
-            geometry = yield from within(whole, _build(folder, plan, settings))
+            geometry = yield from within(whole, _build(folder, plan))
         except _UnusableError as error:
             problems = str(error)
             continue
@@ -143,13 +131,13 @@ class _UnusableError(Exception):
     """A plan that cannot be used, with the reason."""
 
 
-def _build(folder: Path, plan: StreetPlan, settings: SiteSettings) -> Generator[Progress, None, SceneGeometry]:
+def _build(folder: Path, plan: StreetPlan) -> Generator[Progress, None, SceneGeometry]:
     extract, terrain = folder / "site.osm", folder / "site.tif"
     write_extract(extract, plan)
     write_terrain(terrain, plan)
     request = SiteRequest(
         near_latlon=(LATITUDE, LONGITUDE),
-        approaches=settings.approaches,
+        approaches=APPROACHES,
         terrain=TerrainRequest(terrain),
         left_hand=plan.left_hand,
     )
@@ -178,6 +166,6 @@ def _run_of_traffic(
     if settings.pedestrians:
         demand = replace(demand, pedestrians=settings.pedestrians)
     seed = int(random.integers(2**31))
-    scenario = Scenario(demand, signals, seed, settings.warm_up + settings.duration)
-    simulated = yield from simulate_run(folder / "site.net.xml", scenario, settings.warm_up, geometry)
+    scenario = Scenario(demand, signals, seed, WARM_UP + settings.duration)
+    simulated = yield from simulate_run(folder / "site.net.xml", scenario, WARM_UP, geometry)
     shaped(simulated.trajectories, seed).save(run_path(folder, streams[-1]))

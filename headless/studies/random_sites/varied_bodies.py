@@ -1,17 +1,14 @@
 """Bodies drawn at random for the road users of a run: sizes as real ones have them, roof and bonnet lines."""
 
-from collections.abc import Generator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from seip_addon.core.base.progress import Progress
-from seip_addon.core.sensing.traffic.overlaps import find_overlaps
-from seip_addon.core.sensing.traffic.trajectories import CATEGORIES, RoadUser, Trajectories
+from seip_addon.core.sensing.traffic.trajectories import CATEGORIES, Trajectories
 
 CORRELATION = 0.5  # correlation of any two dimensions of one kind of road user
 REACH = 2.0  # largest distance of a drawn dimension from the mean, in standard deviations
-_HALVINGS = 3  # number of times that a growth which causes an overlap is halved before it is dropped
 SHAPES: Mapping[str, tuple[float, float, float, float]] = dict.fromkeys(CATEGORIES, (0.10, 0.06, 0.10, 0.06)) | {
     "car": (0.24, 0.10, 0.14, 0.08),
     "van": (0.20, 0.10, 0.12, 0.08),
@@ -91,32 +88,6 @@ def shaped(trajectories: Trajectories, seed: int) -> Trajectories:
     )
 
 
-def resized(trajectories: Trajectories, change: float, seed: int) -> Generator[Progress, None, Trajectories]:
-    """Multiply each dimension of each road user by a factor of its own, uniform from 1 − ``change`` to 1 + ``change``.
-
-    A road user that would overlap another grows less, or not at all. With the same seed, a larger change modifies each
-    dimension in the same direction, and more. Different traffic has different factors.
-    """
-    users = trajectories.users
-    own = np.array([(user.length, user.width, user.height) for user in users])
-    random = np.random.default_rng([seed, _STREAM, int(trajectories.key, 16)])
-    goal = own * (1.0 + change * random.uniform(-1.0, 1.0, own.shape))
-    before = yield from find_overlaps(trajectories)
-    known = {tuple(pair) for pair in before.pair.tolist()}
-    growth = np.ones(len(users))
-    changed = trajectories
-    for halvings in range(_HALVINGS + 1):
-        sizes = np.where(goal > own, own + growth[:, None] * (goal - own), goal)
-        sizes = np.where(sizes == own, own, sizes.round(3))
-        changed = replace(trajectories, users=tuple(map(_with_size, users, sizes.tolist())))
-        overlaps = yield from find_overlaps(changed)
-        pairs = [pair for pair in overlaps.pair.tolist() if tuple(pair) not in known]
-        if not pairs:
-            break
-        growth[np.unique(pairs)] *= 0.5 if halvings < _HALVINGS - 1 else 0.0
-    return changed
-
-
 def draw_size(category: str, random: np.random.Generator) -> tuple[float, float, float]:
     """Return a length, width and height of a category, metres to the centimetre."""
     kinds = list(KINDS[category].values())
@@ -135,8 +106,3 @@ def draw_shape(category: str, random: np.random.Generator) -> tuple[float, float
     """Return a shape of a category: uniform within its `SHAPES`."""
     shift, spread, rise, stretch = (random.uniform(-1.0, 1.0, 4) * SHAPES[category]).round(4).tolist()
     return shift, spread, rise, stretch
-
-
-def _with_size(user: RoadUser, size: list[float]) -> RoadUser:
-    length, width, height = size
-    return replace(user, length=length, width=width, height=height)

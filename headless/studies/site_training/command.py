@@ -4,7 +4,7 @@ seip study random-sites -o out/sites --sites 16
 seip study site-training out/sites/*/site.blend -o out/detector
 
 The runs of traffic of each scene are in the folder SCENE_traffic next to it. Half of the frames are changed to be as
-recordings are, and groups and sizes of road users vary. The last sites are set aside for validation, which decides when
+recordings are, and pedestrians walk in groups. The last sites are set aside for validation, which decides when
 to stop. Rerun the command to resume an interrupted training.
 """
 
@@ -17,16 +17,14 @@ from typing import TypeVar
 
 from headless import runtime, survey
 from headless.charts.detection import save_training_chart
-from headless.detection.detector import Detector, check_device
+from headless.detection.detector import check_device
 from headless.detection.detector_evaluation import AT_ONCE, side_by_side
 from headless.detection.frames import SampledRecording
-from headless.detection.recordings import MountedSensors, SampledRun, Simulator, sampled_runs
+from headless.detection.recordings import MountedSensors, Simulator, sampled_runs
 from headless.detection.settings import NetworkSettings, TrainingSettings
 from headless.detection.training import train
 from headless.options import add_settings, new_parser, read_settings, real_number
 from headless.studies.detection.case_study import recorded, simulate_all
-from headless.studies.random_sites.companions import with_companions
-from headless.studies.random_sites.varied_bodies import resized
 
 import bpy
 import numpy as np
@@ -45,11 +43,11 @@ from seip_addon.core.site.scene_geometry import SceneGeometry
 from seip_addon.core.site.site import make_site
 from seip_addon.scene.read import read_scene
 
+from .companions import with_companions
 from .field_conditions import field_recording
 
 HEIGHTS = (3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0)  # metres
 TILTS = (0.0, math.radians(5.0), math.radians(10.0), math.radians(15.0))
-SIZE_CHANGE = 0.15  # largest relative change of the dimensions of road users
 MAX_SENSORS = 5  # of a random placement
 NETWORK = NetworkSettings()
 ASIDE = 8  # one of this number of sites is set aside
@@ -76,10 +74,7 @@ def main(argv: list[str]) -> None:
         for scenes in set_aside(list(enumerate(options.scenes)))
     )
     store = options.output / "training.pt"
-    start = None if options.start is None else Detector.load(options.start, options.device)
-    if start is not None and start.settings != NETWORK:
-        raise SeipError(f"{options.start} is of another network: start from a detector of this version")
-    steps = train(training_recordings, validation, NETWORK, training, device=options.device, store=store, start=start)
+    steps = train(training_recordings, validation, NETWORK, training, device=options.device, store=store)
     trained = runtime.finish_with_bar(steps)
     best = trained.curve.best
     trained.detector.save(options.output / "detector.pt", half=True)
@@ -137,10 +132,13 @@ def site_recordings(
     simulator = Simulator(geometry, ScanSettings(seed=seed[0], rolling_shutter=True))
     area, random = simulator.area(NETWORK.pillar), np.random.default_rng(seed)
     name = f"{scene.parent.name}/{scene.stem}"
-    runs = yield from varied_runs(runs, random)
+    grouped = []
+    for run in runs:
+        trajectories = yield from with_companions(run.trajectories, int(random.integers(1 << 31)))
+        grouped.append(replace(run, trajectories=trajectories))
     drawn = [
         (random_placement(f"{name}, placement {number}", candidates, models, random), run)
-        for run in runs
+        for run in grouped
         for number in range(1, placements + 1)
     ]
     scans = [
@@ -165,20 +163,6 @@ def candidates_of_types(geometry: SceneGeometry, models: Mapping[str, LidarModel
             settings = CandidateSettings(sensors=(key,), heights=HEIGHTS, tilts=TILTS)
             by_field[field] = make_site(geometry, settings, fields_of_view=fields).candidates
     return {key: by_field[field] for key, field in fields.items()}
-
-
-def varied_runs(
-    runs: Sequence[SampledRun], random: np.random.Generator
-) -> Generator[Progress, None, tuple[SampledRun, ...]]:
-    """Return runs with groups of pedestrians, half of them with other sizes of all road users (`SIZE_CHANGE`)."""
-    varied = []
-    for run in runs:
-        seed, other_sizes = int(random.integers(1 << 31)), bool(random.integers(2))
-        trajectories = yield from with_companions(run.trajectories, seed)
-        if other_sizes:
-            trajectories = yield from resized(trajectories, SIZE_CHANGE, seed)
-        varied.append(replace(run, trajectories=trajectories))
-    return tuple(varied)
 
 
 def random_placement(
@@ -227,7 +211,6 @@ def _parser() -> argparse.ArgumentParser:
     )
     data.add_argument("--seed", type=int, default=1, metavar="N", help="seed for placements, noise, weights and order")
     work = parser.add_argument_group("training")
-    work.add_argument("--start", type=Path, metavar="PT", help="detector to start from (default: random weights)")
     add_settings(work, TrainingSettings, "steps", "batch", "learning_rate", "patience")
     work.add_argument("--device", default="cpu", help="device of torch: cpu, cuda")
     add_settings(work, TrainingSettings, "threads")

@@ -2,8 +2,8 @@
 
 Simulated frames have the true background and the true height of the road. In a recording both are estimated, sensors
 are calibrated to decimetres, rows of beams fail, and intensities may be unknown. Each function changes one of these in
-a frame, by a generator of random numbers and nothing else. Sensor types, sizes and groups of road users are drawn
-before the scans are simulated (`site_training.command`).
+a frame, by a generator of random numbers and nothing else. Sensor types and groups of pedestrians are drawn before the
+scans are simulated (`site_training.command`).
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from headless.detection.detection_area import DetectionArea
-from headless.detection.frame_points import POINT_FIELDS, recounted, some_points
 from headless.detection.frames import LazyFrames, Recording
+from headless.detection.shared_scans import POINT_FIELDS, some_points
 
 import numpy as np
 from numpy.typing import NDArray
@@ -187,6 +187,17 @@ def with_inexact_ground(frame: Frame, random: np.random.Generator) -> Frame:
     points[:, 2] += error(points[:, :2].astype(np.float64)).astype(np.float32)
     centre[:, 2] += error(centre[:, :2])
     return replace(frame, points=points, labels=replace(frame.labels, centre=centre))
+
+
+def recounted(frame: Frame) -> Frame:
+    """Return the frame with updated numbers of returns in its labels."""
+    labels = frame.labels
+    most = max(int(labels.user.max(initial=0)), int(frame.instance.max(initial=0))) + 1
+    on_users = frame.instance != STATIC_INSTANCE
+    sensors = labels.points.shape[1]
+    cell = frame.instance[on_users].astype(np.int64) * sensors + frame.sensor[on_users]
+    counts = np.bincount(cell, minlength=most * sensors).reshape(most, sensors)
+    return replace(frame, labels=replace(labels, points=counts[labels.user]))
 
 
 def _lift(frame: Frame, area: DetectionArea) -> Float:

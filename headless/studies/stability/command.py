@@ -11,13 +11,11 @@ from pathlib import Path
 
 from headless import runtime, survey
 from headless.charts import robustness as robustness_charts
-from headless.options import new_parser
 from headless.studies.stability.charts import save_convergence_chart, save_delta_chart
 from headless.studies.stability.criterion import criterion_rows, criterion_study
 from headless.studies.stability.page import Chapter, save_page
 from headless.studies.stability.robustness_rows import pose_rows, robust_rows, traffic_rows
-from headless.studies.stability.weather import COUNT, SENSOR, weather_rows, weather_study
-from headless.studies.survey_options import add_survey_options
+from headless.studies.survey_options import study_parser
 
 from seip_addon.core.base.progress import Progress
 from seip_addon.core.choosing.placement.objective import DEFAULT_COUNT, Objective, check_objective, placement_problem
@@ -95,8 +93,7 @@ Work = Callable[[StudiedScene], Generator[Progress, None, Chapter]]
 
 def main(argv: list[str], scope: StabilityScope | None = None) -> None:
     """Study all chapters, and write the page; tests pass a small ``scope``."""
-    parser = new_parser("study stability", "Find the limits of every method, and write a page with charts.")
-    add_survey_options(parser)
+    parser = study_parser("stability", "Find the limits of every method, and write a page with charts.")
     parser.add_argument("--work", type=Path, default=Path("out/stability"), help="folder for the visibility grid")
     options = parser.parse_args(argv)
     charts = options.output / "stability"
@@ -110,7 +107,6 @@ def main(argv: list[str], scope: StabilityScope | None = None) -> None:
     scene = StudiedScene(surveyed, runs, charts, scope or StabilityScope())
     studies: dict[str, Work] = {"criterion": criterion, "poses": poses, "failures": failures}
     studies |= {"traffic": traffic} if len(runs) > 1 else {}
-    studies |= {"weather": weather}
     chapters = []
     for name, study in studies.items():
         chapters.append(watch.run(name, study(scene)))
@@ -157,16 +153,12 @@ def poses(scene: StudiedScene) -> Generator[Progress, None, Chapter]:
     under_errors = yield from pose_study(surroundings(survey), deployment, errors, 0, scene.scope.draws)
     robustness_charts.save_spread_chart(scene.charts / "spread.png", study, f"{scene.placed} under pose errors")
     robustness_charts.save_loss_chart(scene.charts / "blame.png", under_errors, f"{scene.placed}: what costs coverage")
-    robustness_charts.save_frontier_chart(
-        scene.charts / "frontier.png", study, f"{scene.placed}: what robustness costs and saves"
-    )
     return Chapter(
         f"Pose errors: {scene.placed}",
         (*pose_rows(under_errors), *robust_rows(study)),
         {
             "spread.png": "Distribution of coverage over unseen draws: nominal optimum and robust placements",
             "blame.png": "Mean loss with errors of only one sensor, and with only one kind of error",
-            "frontier.png": "Cost of robustness in planned coverage, and gain in the 5 % quantile",
         },
     )
 
@@ -197,12 +189,6 @@ def traffic(scene: StudiedScene) -> Generator[Progress, None, Chapter]:
             "promise.png": "Coverage of placements on the empty road and, on average over time, in traffic",
         },
     )
-
-
-def weather(scene: StudiedScene) -> Generator[Progress, None, Chapter]:
-    """Study a fleet in rain and fog."""
-    answers = yield from weather_study(scene.survey.geometry, scene.survey.settings)
-    return Chapter(f"Weather: {COUNT} × {SENSOR}", weather_rows(answers), {})
 
 
 def _robust(scene: StudiedScene, risks: Sequence[Risk]) -> Generator[Progress, None, tuple[Comparison, ...]]:

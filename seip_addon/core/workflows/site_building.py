@@ -17,7 +17,6 @@ from ..geometry.geo_reference import GeoReference
 from ..geometry.plan import united
 from ..storage.files import whole_file
 from ..world.elevation.at_place import MapSurroundings, TerrainRequest, with_terrain
-from ..world.elevation.obstacles import Merging
 from ..world.opendrive.junctions import STREETS
 from ..world.opendrive.read import read_map
 from ..world.opendrive.road_map import RoadMap
@@ -93,7 +92,6 @@ class BuiltSite:
     map_name: str
     model: SiteModel
     map_text: str | None = None
-    merging: tuple[Merging, ...] = ()
     map_path: Path | None = None
 
 
@@ -125,9 +123,9 @@ def build_site(
     if request.osm is not None:
         where = _where(streets, description)
         description, notes = yield from surroundings_of_map(request.osm, streets, description, *where)
-    description, more, merging = yield from _with_terrain(streets, description, request)
+    description, more = yield from _with_terrain(streets, description, request)
     model = yield from street_model(streets, description)
-    return BuiltSite(map_path.name, replace(model, notes=(*notes, *more, *model.notes)), None, merging, map_path)
+    return BuiltSite(map_path.name, replace(model, notes=(*notes, *more, *model.notes)), None, map_path)
 
 
 def site_source(request: SiteRequest, source: Path | None = None) -> Generator[Progress, None, Path]:
@@ -189,7 +187,7 @@ def _of_extract(source: Path, request: SiteRequest, map_path: Path | None) -> Ge
         name=described.name or found.name,
         level=request.level,
     )
-    description, more, merging = yield from _with_terrain(site.network.streets, description, request)
+    description, more = yield from _with_terrain(site.network.streets, description, request)
     yield Progress(0, 0, "heights of streets")
     site = replace(site, description=description).on_ground()
     try:
@@ -200,15 +198,15 @@ def _of_extract(source: Path, request: SiteRequest, map_path: Path | None) -> Ge
         _write_map(credited(site.network.text, site.description.attribution), map_path)
         raise UnclearLevelError(f"{error}; {map_path} is written: the map of the streets there") from error
     map_text = credited(site.network.text, model.attribution)
-    return BuiltSite(source.name, replace(model, notes=(*site.notes, *more, *model.notes)), map_text, merging)
+    return BuiltSite(source.name, replace(model, notes=(*site.notes, *more, *model.notes)), map_text)
 
 
 def _with_terrain(
     streets: StreetMap, description: SiteDescription, request: SiteRequest
-) -> Generator[Progress, None, tuple[SiteDescription, tuple[str, ...], tuple[Merging, ...]]]:
+) -> Generator[Progress, None, tuple[SiteDescription, tuple[str, ...]]]:
     """Add ground and objects from a terrain file to a description."""
     if request.terrain is None:
-        return description, (), ()
+        return description, ()
     middle, reach = _where(streets, description)
     area = shapely.Point(middle).buffer(reach + SCENE_MARGIN + STANDS_AROUND, quad_segs=16)
     x, y, z, heading = streets.road_map.header_offset.tolist()

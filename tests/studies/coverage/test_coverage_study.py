@@ -7,7 +7,7 @@ from headless.studies.claims import save_claims
 from headless.studies.coverage.cells import CENTRAL_WEIGHTS, COUNTS, EmptyCell, coverage_study
 from headless.studies.coverage.charts import save_height_chart, save_weight_chart
 from headless.studies.coverage.claims import coverage_claims
-from headless.studies.coverage.tables import save_study_table
+from headless.studies.coverage.command import save_study_table
 
 import numpy as np
 import pytest

@@ -5,8 +5,7 @@ from itertools import product
 
 from headless.studies.claims import FAILS, HOLDS, UNDECIDED, Claim
 from headless.studies.coverage.cells import CHARTED_WEIGHT, COUNTS, Case, CoverageStudy, EmptyCell
-from headless.studies.paper.page import PlacementFigures, page
-from headless.studies.paper.published import PUBLISHED_CLAIMS
+from headless.studies.paper.page import PUBLISHED_CLAIMS, PlacementFigures, page
 
 TYPES, HEIGHTS, TARGETS = ("type1", "type2", "type3"), (3.5, 5.4, 8.0), 1000
 FACTS = {"scene": "the map", "criterion": "δ = 1 m", "traffic": "only SUMO", "training": "60 steps"}

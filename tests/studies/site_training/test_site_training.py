@@ -1,6 +1,5 @@
 """Training on random placements at several sites."""
 
-from dataclasses import replace
 from shutil import copyfile
 
 import pytest
@@ -15,7 +14,6 @@ from headless.studies.site_training.command import HEIGHTS, MAX_SENSORS, TILTS, 
 
 import numpy as np
 
-from seip_addon.core.base.errors import SeipError
 from seip_addon.core.sensing.lidar.catalogue import load_catalogue
 from tests.builders.small_junction import make_example
 
@@ -50,19 +48,6 @@ def test_a_detector_is_trained_and_the_same_again(sites, tmp_path):
     assert (tmp_path / "one" / "training.png").read_bytes().startswith(b"\x89PNG")
     weights = detector.state_dict()["feature_map.encoder.linear.weight"]
     assert (weights == weights.half().float()).all()
-
-
-def test_a_training_continues_from_a_detector_of_its_network(sites, tmp_path, monkeypatch):
-    train_on_sites.main([*sites, *BRIEF, "-o", str(tmp_path / "first")])
-    first = tmp_path / "first" / "detector.pt"
-    more = [*sites, *BRIEF, "--start", str(first), "--learning-rate", "0.0001", "-o", str(tmp_path / "second")]
-    train_on_sites.main(more)
-    name = "feature_map.encoder.linear.weight"
-    near, far = (Detector.load(tmp_path / part / "detector.pt").state_dict()[name] for part in ("first", "second"))
-    assert 0 < (near - far).abs().max() < 0.01
-    monkeypatch.setattr(train_on_sites, "NETWORK", replace(SMALL, width=16))
-    with pytest.raises(SeipError, match="is of another network"):
-        train_on_sites.main(more)
 
 
 def test_random_placements_are_of_different_positions_and_all_poses():

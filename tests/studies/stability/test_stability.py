@@ -4,7 +4,6 @@ from pathlib import Path
 from unittest.mock import patch
 
 from headless.studies.stability import command as stability
-from headless.studies.stability import weather
 
 from seip_addon.core.choosing.placement.scenarios import Scenarios
 
@@ -19,22 +18,19 @@ LITTLE = stability.StabilityScope(
 
 
 def test_the_page_has_all_chapters_and_charts(tmp_path):
-    with (
-        patch.multiple(
-            "headless.studies.stability.criterion",
-            DELTAS=(4.0, 6.0),
-            GRID_SPACINGS=(8.0, 6.0),
-            CANDIDATE_SPACINGS=(30.0, 25.0),
-            EVALUATION_SPACING=4.0,
-        ),
-        patch.object(weather, "WEATHERS", ("visibility=50",)),
+    with patch.multiple(
+        "headless.studies.stability.criterion",
+        DELTAS=(4.0, 6.0),
+        GRID_SPACINGS=(8.0, 6.0),
+        CANDIDATE_SPACINGS=(30.0, 25.0),
+        EVALUATION_SPACING=4.0,
     ):
         stability.main([str(SCENE), "-o", str(tmp_path), "--work", str(tmp_path / "work"), *COARSE], LITTLE)
     page = (tmp_path / "stability.md").read_text(encoding="utf-8")
     titles = [line[3:].partition(":")[0] for line in page.splitlines() if line.startswith("## ")]
-    assert titles == ["The criterion of visibility", "Pose errors", "Failures", "Occlusion by traffic", "Weather"]
+    assert titles == ["The criterion of visibility", "Pose errors", "Failures", "Occlusion by traffic"]
     named = {part.split(")")[0] for part in page.split("](stability/")[1:]}
     assert named == {path.name for path in (tmp_path / "stability").iterdir()}
     rows = [line for line in page.splitlines() if line.startswith("| ") and "---" not in line]
-    assert len(rows) == 5 + 5 + 6 + 2 + 2 + 1
+    assert len(rows) == 4 + 5 + 6 + 2 + 2
     assert all(line.count(" | ") == 4 for line in rows)

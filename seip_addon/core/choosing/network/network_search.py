@@ -1,4 +1,4 @@
-"""Search for the best allocations of budgets to sites, which solves a site only where a decision depends on it."""
+"""Search for the best allocation of a budget to sites, which solves a site only where a decision depends on it."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ MANY_SITES = 30
 """Number of sites from which rounds use the linear relaxation: the integer program takes a second for 100 sites. With
 few sites it is fast, and spares searches of amounts that only a mixture of alternatives takes."""
 EXACT_SITES = 1000
-"""Largest number of sites for which the integer program is solved at all: six budgets take half a minute at 1,000
+"""Largest number of sites for which the integer program is solved at all: six budgets took half a minute at 1,000
 random sites, and more than three minutes at 3,000. Beyond, the relaxation stands for it to the end: it takes several
 alternatives of one site at most, so that rounding it down loses less than that site is worth."""
 
@@ -48,24 +48,6 @@ class Request:
     site: int
     budget: float
     effort: float
-
-
-@dataclass(frozen=True)
-class Goal:
-    """Budget to allocate.
-
-    Parameters
-    ----------
-    budget : float, dollars
-    tolerance : float
-        Gap at which the search ends.
-    effort : float, units of counted work
-        Limit of each search at a site; the gap stays larger than the tolerance where it does not suffice.
-    """
-
-    budget: float
-    tolerance: float
-    effort: float = LAST_EFFORT
 
 
 Solve = Callable[[Sequence[Request]], Generator[Progress, None, Sequence[SolvedBudget]]]
@@ -99,22 +81,22 @@ class NetworkAllocation:
     frontiers: tuple[Frontier, ...]
 
 
-def search_allocations(
+def search_allocation(
     frontiers: Sequence[Frontier],
     weights: Float,
-    goals: Sequence[Goal],
+    budget: float,
+    tolerance: float,
     solve: Solve,
     *,
     gap: Gap = relative_gap,
-) -> Generator[Progress, None, tuple[NetworkAllocation, ...]]:
-    """Allocate each of several budgets to sites until its bound is within its tolerance of its value.
+) -> Generator[Progress, None, NetworkAllocation]:
+    """Allocate a budget to sites until its bound is within a tolerance of its value.
 
-    Before the first round each site is solved for the money of one sensor, two, four and all. Each round allocates each
+    Before the first round each site is solved for the money of one sensor, two, four and all. Each round allocates the
     budget twice: once among the placements found, which gives a value that is reached, and once among the bounds of all
     amounts of money, which gives a value that no allocation exceeds. Where the second takes an amount that has not been
     solved, it is solved, together with the one in the middle below the next solved one; where all it takes have been
-    solved, those whose own gaps are largest are searched longer, up to the effort of the goal. The requests of all
-    budgets are solved together, so that many workers are busy. With many sites the linear relaxation stands for the
+    solved, those whose own gaps are largest are searched longer. With many sites the linear relaxation stands for the
     integer program as long as it takes amounts that have not been solved.
 
     Parameters
@@ -122,47 +104,27 @@ def search_allocations(
     frontiers : sequence of Frontier
     weights : (s,) float64
         Importance of each site.
-    goals : sequence of Goal
+    budget : float, dollars
+    tolerance : float
+        Gap at which the search ends.
     solve : callable
         Solves budgets at sites.
     gap : callable
         Gap between the value of an allocation and its bound.
-
-    Returns
-    -------
-    tuple of NetworkAllocation
-        One for each goal.
     """
     known = list(frontiers)
-    first = {one for goal in goals for one in _first_requests(known, goal.budget)}
-    known = yield from _solved(known, first, solve)
-    open_goals = list(goals)
-    while open_goals:
-        wanted: dict[float, list[Request]] = {}
-        gaps: dict[float, float] = {}
-        # Goals of the same budget share the work; they differ by tolerance and effort only.
-        for budget in dict.fromkeys(goal.budget for goal in open_goals):
-            least = min(goal.tolerance for goal in open_goals if goal.budget == budget)
-            wanted[budget], gaps[budget] = [], math.inf
-            if len(known) >= MANY_SITES:
-                wanted[budget], gaps[budget] = yield from _reporting(
-                    partial(_relaxed_round, known, weights, budget, gap)
-                )
-            if not wanted[budget] and gaps[budget] > least:
-                exact = yield from _reporting(partial(_Round, known, weights, budget))
-                wanted[budget], gaps[budget] = exact.requests(), exact.gap(gap)
-        requests = {
-            goal: [one for one in wanted[goal.budget] if one.effort <= goal.effort]
-            for goal in open_goals
-            if gaps[goal.budget] > goal.tolerance
-        }
-        open_goals = [goal for goal, own in requests.items() if own]
-        known = yield from _solved(known, set().union(*requests.values()), solve)
-    allocations = []
-    for goal in goals:
-        last = yield from _reporting(partial(_Round, known, weights, goal.budget))
-        allocations.append(last.allocation())
-    return tuple(allocations)
+    requests = _first_requests(known, budget)
+    while requests:
+        known = yield from _solved(known, requests, solve)
+        requests, reached = [], math.inf
+        if len(known) >= MANY_SITES:
+            requests, reached = yield from _reporting(partial(_relaxed_round, known, weights, budget, gap))
+        if not requests and reached > tolerance:
+            exact = yield from _reporting(partial(_Round, known, weights, budget))
+            requests, reached = exact.requests(), exact.gap(gap)
+        if reached <= tolerance:
+            break
+    return (yield from _reporting(partial(_Round, known, weights, budget))).allocation()
 
 
 def _reporting(work: Callable[[], Result]) -> Generator[Progress, None, Result]:
@@ -279,10 +241,10 @@ def _reached(frontier: Frontier, budget: float) -> float:
 
 
 def _solved(
-    frontiers: list[Frontier], requests: set[Request], solve: Solve
+    frontiers: list[Frontier], requests: Sequence[Request], solve: Solve
 ) -> Generator[Progress, None, list[Frontier]]:
     """Return the frontiers with the results of requests."""
-    ordered = sorted(requests, key=lambda one: (one.site, one.budget, one.effort))
+    ordered = sorted(set(requests), key=lambda one: (one.site, one.budget, one.effort))
     results = yield from solve(ordered)
     known = list(frontiers)
     for request, result in zip(ordered, results, strict=True):

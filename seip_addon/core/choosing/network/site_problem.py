@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Generator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
@@ -15,9 +15,8 @@ from ...base.arrays import Boolean, Float, Integer, Text
 from ...base.errors import SeipError
 from ...base.progress import Progress
 from ...storage.array_file import ArrayFile
-from ..placement.cheapest import cheapest_for_share
 from ..placement.concave import COVERAGE, LOG_RETURNS
-from ..placement.problem import Placement, PlacementProblem
+from ..placement.problem import PlacementProblem
 from ..placement.search_limits import SolverLimits
 from ..placement.solver import solve
 from .frontier import Frontier, SolvedBudget, possible_amounts
@@ -120,32 +119,17 @@ class SiteProblem:
         """
         problem = self._problem(budget)
         placement = yield from solve(problem, SolverLimits(effort=effort))
-        return self._solved(placement, budget, effort, placement.bound / math.fsum(problem.weights))
-
-    def cheapest(self, coverage: float, effort: float) -> Generator[Progress, None, tuple[SolvedBudget, float]]:
-        """Find the cheapest placement that sees a share of the targets; return it with a bound on the least price.
-
-        Raises
-        ------
-        SeipError
-            The coverage cannot be reached.
-        """
-        problem = self._problem(None)
-        placement = yield from cheapest_for_share(problem, coverage, SolverLimits(effort=effort))
-        found = self._solved(placement, placement.price, effort, 1.0)
-        return replace(found, bound=found.value), max(0.0, placement.bound)
-
-    def _solved(self, placement: Placement, budget: float, effort: float, bound: float) -> SolvedBudget:
         chosen = tuple(placement.chosen.tolist())
         value = self.value(chosen)
         price = math.fsum(self.prices[list(chosen)])
         # A search that ends early may have no bound of its own; all poses together are one.
         most = self.value(range(len(self.prices)))
-        bound = value if placement.status == "optimal" else max(value, min(bound, most))
+        bound = min(placement.bound / math.fsum(problem.weights), most)
+        bound = value if placement.status == "optimal" else max(value, bound)
         return SolvedBudget(budget, chosen, price, value, bound, effort)
 
-    def _problem(self, budget: float | None) -> PlacementProblem:
-        """Return the problem of a budget, or without one."""
+    def _problem(self, budget: float) -> PlacementProblem:
+        """Return the problem of a budget."""
         poses = len(self.prices)
         of_returns = self.criterion == "returns"
         return PlacementProblem(

@@ -15,7 +15,7 @@ from matplotlib.lines import Line2D
 from ...base.arrays import Float
 from ...base.counts import round_number
 from ...geometry.tangent_plane import plan_metres
-from ..pictures.chart_style import add_legend, new_figure, plain_legend, set_title, style_axes
+from ..pictures.chart_style import plain_legend
 from ..pictures.drawing import (
     Style,
     Window,
@@ -28,7 +28,7 @@ from ..pictures.drawing import (
 )
 from ..pictures.palette import INK, PAPER, PAPER_STREETS, SHARE_COLOURS, SOFT_INK
 from ..report.wording import dollars
-from .network_record import NetworkRecord, colour_title, level, level_words, outcome, ranked_sites
+from .network_record import NetworkRecord, colour_title, level, level_words, ranked_sites
 
 Street = tuple[Float, int]
 """Latitudes and longitudes of a street, (n, 2) float64, and its importance, 0 to 2."""
@@ -38,18 +38,14 @@ FINEST = 2000  # parts of the window's width that streets are simplified to
 LARGEST_RADIUS, SMALLEST_RADIUS, BARE_RADIUS = 18.0, 3.5, 4.5
 """Pixels of circles: for the most money, at least, and of sites without sensor."""
 DPI = 150
-MAP_SIZE, LEGEND_HEIGHT, CURVE_SIZE = (7.2, 3.9), 0.55, (7.2, 3.1)  # inches
+MAP_SIZE, LEGEND_HEIGHT = (7.2, 3.9), 0.55  # inches
 MAP_SHAPE = (MAP_SIZE[1] - LEGEND_HEIGHT) / MAP_SIZE[0]
 PIXEL = 0.45  # points for each pixel of `NetworkView.radii`
 STREET_WIDTHS = (0.4, 0.7, 1.2)  # points, by importance
-MOST_NUMBERED, MOST_MARKED = 12, 40  # sites with their rank on the map; points of a curve that are marked
+MOST_NUMBERED = 12  # sites with their rank on the map
 STATUS_MARKS: dict[str, Style] = {
     "without sensor": {"marker": "o", "markersize": 2 * BARE_RADIUS * PIXEL, "mfc": PAPER, "mec": SOFT_INK, "mew": 1.0},
     "failed": {"marker": "x", "markersize": 6.5, "mec": SOFT_INK, "mew": 1.4},
-}
-CRITERIA = {
-    "road": "road seen, mean of the sites",
-    "returns": "typical returns from a road user",
 }
 
 
@@ -66,25 +62,15 @@ class NetworkView:
     window: Window
     streets: tuple[Street, ...]
 
-    @property
-    def width(self) -> float:
-        """Width of the window, metres."""
-        return self.window[2] - self.window[0]
 
-    @property
-    def shape(self) -> float:
-        """Height of the window over its width."""
-        return (self.window[3] - self.window[1]) / self.width
-
-
-def network_view(record: NetworkRecord, streets: Sequence[Street] | None, shapes: tuple[float, float]) -> NetworkView:
-    """Return the map whose window is as high as wide times a number within ``shapes``."""
+def network_view(record: NetworkRecord, streets: Sequence[Street] | None) -> NetworkView:
+    """Return sites and streets in the window of the map."""
     degrees = np.array([(site.latitude, site.longitude) for site in record.sites]).reshape(-1, 2)
     middle = _middle(degrees)
     places = plan_metres(degrees, middle)
     low, high = (places.min(axis=0), places.max(axis=0)) if len(places) else (np.zeros(2), np.zeros(2))
     around = np.maximum(MARGIN * (high - low), (LEAST_EXTENT - (high - low)) / 2)
-    window = window_around((*(low - around).tolist(), *(high + around).tolist()), 0.0, shapes)
+    window = window_around((*(low - around).tolist(), *(high + around).tolist()), 0.0, (MAP_SHAPE, MAP_SHAPE))
     money = np.array([site.price_usd for site in record.sites])
     largest = min(LARGEST_RADIUS, max(9.0, 110.0 / math.sqrt(max(1, len(money)))))
     radii = np.maximum(SMALLEST_RADIUS, largest * np.sqrt(money / max(1.0, money.max(initial=0.0))))
@@ -133,8 +119,9 @@ def _drawn(streets: Sequence[Street], middle: Float, window: Window) -> Iterator
     yield from simple
 
 
-def draw_map(record: NetworkRecord, view: NetworkView) -> bytes:
-    """Return the sites on the streets as PNG, the first of them with their ranks; the view has the shape of the map."""
+def draw_map(record: NetworkRecord, streets: Sequence[Street] | None = None) -> bytes:
+    """Return the sites on the streets as PNG, the first of them with their ranks."""
+    view = network_view(record, streets)
     width, height = MAP_SIZE
     figure = new_page(MAP_SIZE, DPI)
     axes = add_axes(figure, 0.0, LEGEND_HEIGHT, width, height - LEGEND_HEIGHT, view.window)
@@ -175,49 +162,3 @@ def _draw_legend(figure: Figure, record: NetworkRecord, view: NetworkView) -> No
     spacing: Style = {"handletextpad": 0.1, "columnspacing": 0.9, "title_fontsize": 8, "bbox_to_anchor": (0.5, 0.005)}
     title = f"{colour_title(record)} (colour), money spent (area); numbers: ranks by gain per dollar"
     plain_legend(figure, lines, [words for words, _ in marks], title=title, **style, **spacing)
-
-
-def draw_curve(record: NetworkRecord) -> bytes:
-    """Return the value of the network against money, with its bound and the budget, as PNG."""
-    figure, (axes,) = new_figure(*CURVE_SIZE, dpi=DPI)
-    money = np.array([point.price_usd for point in record.curve]) / 1000.0
-    values, bounds = (_shown(record, [getattr(point, name) for point in record.curve]) for name in ("value", "bound"))
-    if len(money):
-        style: Style = {"color": SHARE_COLOURS[1], "linewidth": 0.0}
-        # Between two points, the placement of less money is still possible, and the bound of more money still holds.
-        steps = np.repeat(money, 2)[1:]
-        lower = np.repeat(values, 2)[:-1]
-        upper = np.concatenate([bounds[:1], np.repeat(bounds[1:], 2)])[: len(steps)]
-        axes.fill_between(steps, lower, np.maximum(lower, upper), label="not ruled out by the bound", **style)
-        axes.plot(steps, lower, color=SHARE_COLOURS[3], label="best found")
-        if len(money) <= MOST_MARKED:
-            axes.plot(money, values, "o", color=SHARE_COLOURS[3], markersize=4)
-    placed = _shown(record, [record.value])
-    ring: Style = {"markersize": 12, "mfc": "none", "mec": INK, "mew": 1.6, "linestyle": "none"}
-    axes.plot(record.price_usd / 1000.0, placed, marker="o", label="this network", clip_on=False, **ring)
-    budget = record.budget_usd / 1000.0
-    axes.axvline(budget, color=SOFT_INK, linewidth=1.0, linestyle=(0, (4, 2)), zorder=1.0)
-    place: Style = {"transform": axes.get_xaxis_transform(), "ha": "center", "va": "bottom"}
-    axes.text(budget, 1.0, "budget", size=8.5, color=SOFT_INK, **place)
-    style_axes(axes, "money, $1,000", CRITERIA[record.criterion])
-    axes.xaxis.set_major_formatter("{x:,.0f}")
-    axes.yaxis.set_major_formatter("{x:.0f}%" if record.criterion == "road" else "{x:g}")
-    axes.set_xlim(left=0.0)
-    axes.set_ylim(0.0, max(1.0, axes.get_ylim()[1]))
-    add_legend(figure, [axes])
-    set_title(figure, record.name)
-    return as_png(figure)
-
-
-def _shown(record: NetworkRecord, values: list[float]) -> Float:
-    array = np.array(values, dtype=np.float64)
-    shown: Float = 100.0 * array if record.criterion == "road" else np.expm1(np.minimum(array, 50.0))
-    return shown
-
-
-def caption(record: NetworkRecord) -> str:
-    """Return the caption of the curve."""
-    what = CRITERIA[record.criterion]
-    what += ": geometric mean of 1 + returns, less 1" if record.criterion == "returns" else ""
-    result = f"{outcome(record, record.value)} for {dollars(record.price_usd)}"
-    return f"{what[:1].upper()}{what[1:]}, for amounts of money; the ring is this network: {result}."

@@ -14,22 +14,13 @@ from ...choosing.placement.returns_summary import returns_text
 from ...storage.json_dataclass import as_json
 from ..pictures.drawing import percent
 
-SCHEMA = "seip-network/2"
+SCHEMA = "seip-network/3"
 
 PROVEN = 1e-9
 """Gap up to which a network is proven optimal: smaller differences are rounding, as in `problem.TIE_TOLERANCE`."""
 COVERAGE_STEPS, RETURNS_STEPS = (0.2, 0.4, 0.6, 0.8), (1.0, 5.0, 20.0, 100.0)
 """Coverages, and typical returns, at which a site gets the next of `SHARE_COLOURS`."""
 _ORDER = ("equipped", "without sensor", "failed")
-
-
-@dataclass(frozen=True)
-class NetworkPoint:
-    """Best value of the criterion found for at most an amount of money, and the proven bound on it."""
-
-    price_usd: float
-    value: float
-    bound: float
 
 
 @dataclass(frozen=True)
@@ -72,8 +63,6 @@ class NetworkSite:
         Value of the criterion at the site with its sensors, and a bound on it for that money.
     coverage : float, 0 to 1
         Share of the road that its sensors see.
-    frontier : tuple of NetworkPoint
-        Best values for amounts of money, as far as the allocation needed them; prices rise.
     """
 
     name: str
@@ -88,7 +77,6 @@ class NetworkSite:
     bound: float = 0.0
     coverage: float = 0.0
     sensors: tuple[NetworkSensor, ...] = ()
-    frontier: tuple[NetworkPoint, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -103,16 +91,10 @@ class NetworkRecord:
         ``road``: share of the targets on the road that are seen, 0 to 1. ``returns``: mean of ln(1 + expected returns)
         of road users. The value of the network is the mean over its sites, by their weights; sites that failed are left
         out.
-    curve : tuple of NetworkPoint
-        Value of the network for amounts of money; prices rise.
     sensor_types : tuple of str
         Types to choose from, by their keys in the catalogue; ``sensor_names`` has the products.
     created : str
         Time of the placement (ISO 8601), "" if it is not recorded.
-    goal : float, optional
-        Share of the road to be seen at every site at the least price; the budget is then the price.
-    least_usd : float, dollars
-        Proven bound: nothing cheaper reaches the goal.
     """
 
     name: str
@@ -122,14 +104,11 @@ class NetworkRecord:
     value: float
     bound: float
     sites: tuple[NetworkSite, ...]
-    curve: tuple[NetworkPoint, ...]
     sensor_types: tuple[str, ...]
     sensor_names: Mapping[str, str] = field(default_factory=dict)
     attribution: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     created: str = ""
-    goal: float | None = None
-    least_usd: float = 0.0
 
     @property
     def gap(self) -> float:
@@ -140,23 +119,12 @@ class NetworkRecord:
     def certificate(self) -> str:
         """Certificate as a sentence."""
         money = f"${self.budget_usd:,.0f}"
-        if self.goal is not None:
-            whole = f"{100 * self.goal:g}% of the road at every site"
-            if self.least_usd >= self.price_usd * (1.0 - PROVEN):
-                return f"Proven: nothing cheaper among these sites and candidates sees {whole}."
-            least, saving = math.floor(self.least_usd + 1e-6), math.ceil(1e4 * self.saving - 1e-6) / 100
-            return f"Nothing for less than ${least:,} sees {whole}: at most {saving:.2f}% can be saved."
         use = f"Proven: no other use of {money} among these sites and candidates"
         if self.criterion == "road":
             most = "" if self.gap <= PROVEN else f" than {math.ceil(self.bound * 1000 - 1e-6) / 10:.1f}%"
             return f"{use} sees more{most} of the road."
         most = "" if self.gap <= PROVEN else f" than {math.ceil(10 * math.expm1(self.bound) - 1e-6) / 10:,.1f}"
         return f"{use} has more{most} returns from a typical road user."
-
-    @property
-    def saving(self) -> float:
-        """Largest possible share of the price that a cheaper network with the same goal saves."""
-        return max(0.0, 1.0 - self.least_usd / self.price_usd) if self.price_usd > 0 else 0.0
 
 
 def network_gap(criterion: Literal["road", "returns"], value: float, bound: float) -> float:

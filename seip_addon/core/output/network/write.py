@@ -1,4 +1,4 @@
-"""Files of a network of sites: tables, pictures, map, and a report with one page for decisions."""
+"""Files of a network of sites: tables, map, and a report with one page for decisions."""
 
 from __future__ import annotations
 
@@ -15,8 +15,7 @@ from ..report.pdf import save_report
 from ..report.wording import date, dollars
 from ..results.answer import sentence
 from ..results.geographic_files import DECIMALS, Feature, feature, save_features
-from .network_map import MAP_SHAPE, Street, caption, draw_curve, draw_map, network_view
-from .network_page import network_page
+from .network_map import Street, draw_map
 from .network_record import (
     NetworkRecord,
     RankedSite,
@@ -34,8 +33,7 @@ COLUMNS = (
 )
 DIGITS = 9  # of values
 NETWORK_FILES = ("network.json", "network.geojson", "sites.csv")
-PICTURES = ("map.png", "curve.png")
-PAGE = "network.html"
+PICTURE = "map.png"
 GAIN = {
     "road": "Gain per $1,000 is in percentage points of the road seen at the site",
     "returns": "Gain per $1,000 is the growth of 1 + typical returns at the site",
@@ -43,14 +41,14 @@ GAIN = {
 
 
 def write_network(folder: Path, record: NetworkRecord, streets: Sequence[Street] | None = None) -> tuple[Path, ...]:
-    """Write record, tables, pictures, map and report of a network; the same arguments give the same bytes.
+    """Write record, tables, map and report of a network; the same arguments give the same bytes.
 
     Parameters
     ----------
     folder : Path
         Created if it is missing.
     streets : sequence of ((n, 2) float64, int), optional
-        Background of the maps: latitudes and longitudes of each street in degrees, and its importance from 0 to 2.
+        Background of the map: latitudes and longitudes of each street in degrees, and its importance from 0 to 2.
 
     Returns
     -------
@@ -61,18 +59,16 @@ def write_network(folder: Path, record: NetworkRecord, streets: Sequence[Street]
     SeipError
         The folder or a file cannot be written.
     """
-    pictures = (draw_map(record, network_view(record, streets, (MAP_SHAPE, MAP_SHAPE))), draw_curve(record))
-    report = make_network_report(record, *pictures)
-    contents = (*pictures, network_page(record, streets).encode())
+    drawn = draw_map(record, streets)
     save_json(folder / NETWORK_FILES[0], network_json(record))
     save_features(folder / NETWORK_FILES[1], record.name, record.attribution, _features(record))
     save_csv(
         folder / NETWORK_FILES[2], COLUMNS, [[_figures(one)[name] for name in COLUMNS] for one in ranked_sites(record)]
     )
-    for name, content in zip((*PICTURES, PAGE), contents, strict=True):
-        with whole_file(folder / name) as temporary:
-            temporary.write_bytes(content)
-    return (*(folder / name for name in (*NETWORK_FILES, *PICTURES, PAGE)), *save_report(folder, report))
+    with whole_file(folder / PICTURE) as temporary:
+        temporary.write_bytes(drawn)
+    report = save_report(folder, make_network_report(record, drawn))
+    return (*(folder / name for name in (*NETWORK_FILES, PICTURE)), *report)
 
 
 def _features(record: NetworkRecord) -> Iterator[Feature]:
@@ -109,8 +105,8 @@ def _within_a_turn(longitude: float) -> float:
     return round(longitude - 360.0 * round(longitude / 360.0), DECIMALS)
 
 
-def make_network_report(record: NetworkRecord, drawn_map: bytes, drawn_curve: bytes) -> Report:
-    """Return the report with the map and the curve, PNG, on its first page."""
+def make_network_report(record: NetworkRecord, drawn_map: bytes) -> Report:
+    """Return the report with the map, PNG, on its first page."""
     ranked = ranked_sites(record)
     failed = tuple((one.site.name, one.site.message) for one in ranked if one.site.status == "failed")
     left_out = (Paragraph("The figures of the network leave these sites out."), Table(("Site", "Reason"), failed))
@@ -123,7 +119,6 @@ def make_network_report(record: NetworkRecord, drawn_map: bytes, drawn_curve: by
     first = (
         Facts(tuple(_key_figures(record)), large=True),
         Picture(drawn_map, "Sites, north is up. Colour shows the result, area the money; hollow: without sensor."),
-        Picture(drawn_curve, caption(record)),
     )
     title = f"Roadside LiDAR sensors at the sites of a network{f', {date(record.created)}' if record.created else ''}"
     return Report(record.name, title, record.created, first, make_sections(contents))

@@ -81,7 +81,6 @@ POSE_ERRORS = "with errors of"
 CAPTIONS = {
     "spread.png": "Coverage over draws of pose errors that were not used for choosing.",
     "blame.png": "What each sensor's errors, and each kind of error, cost on average.",
-    "frontier.png": "What is lost as planned for what is gained where poses err.",
     "time_seen.png": "For which share of the time each part of the road is seen in traffic.",
     "traffic.png": "The empty road and the road in traffic.",
 }

@@ -1,6 +1,6 @@
 """Names of files in a folder of results that several programs write or read."""
 
-POSE_ERROR_PICTURES = ("spread.png", "blame.png", "frontier.png")
+POSE_ERROR_PICTURES = ("spread.png", "blame.png")
 TRAFFIC_PICTURES = ("time_seen.png", "traffic.png")
 REPORT_FILES = ("report.html", "report.pdf")
 VERIFICATION_FOLDER = "verification"

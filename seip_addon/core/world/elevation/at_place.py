@@ -29,9 +29,7 @@ from .obstacles import (
     MIN_ABOVE,
     RAYS,
     UNCLASSIFIED,
-    Merging,
     chosen_boxes,
-    chosen_merging,
     obstacle_raster,
     solids,
 )
@@ -94,7 +92,7 @@ class MapSurroundings:
 
 def with_terrain(
     description: SiteDescription, request: TerrainRequest, around: MapSurroundings
-) -> Generator[Progress, None, tuple[SiteDescription, tuple[str, ...], tuple[Merging, ...]]]:
+) -> Generator[Progress, None, tuple[SiteDescription, tuple[str, ...]]]:
     """Add ground heights to the description of a place with a flat map, and the objects of a survey.
 
     A map with heights keeps them; from a survey only the objects are added.
@@ -114,8 +112,6 @@ def with_terrain(
         Description with ground and objects added.
     notes : tuple of str
         Messages about the sources of heights and objects.
-    merging : tuple of Merging
-        Tolerances that were tried to merge the objects of a survey into few boxes.
 
     Raises
     ------
@@ -135,13 +131,13 @@ def with_terrain(
         model = read_geotiff(path)
         smooth = _of_model(model, around.reference, around.area).smoothed(SMOOTHING)
         credited = description.with_attribution(model.copyright)
-        return replace(credited, relief=Relief(smooth, level)), (_heights_note(path, smooth),), ()
+        return replace(credited, relief=Relief(smooth, level)), (_heights_note(path, smooth),)
     points, classes = yield from _survey_points(request, around)
     smooth = _surveyed_ground(points, classes, around.area, path.name).smoothed(SMOOTHING)
     yield Progress(0, 0, "boxes of the survey")
     standing = _standing(points, classes, around)
     raster = obstacle_raster(smooth, points[standing], classes[standing])
-    boxes, tried = chosen_boxes(raster, np.random.default_rng(_SEED))
+    boxes, changed = chosen_boxes(raster, np.random.default_rng(_SEED))
     # A map with heights may use a different zero: objects move by the median difference between lanes and ground.
     raised = 0.0 if is_flat else float(np.median(around.lanes[:, 2] - smooth.at(around.lanes[:, :2])))
     added = tuple(_placed(name, solid, raised) for name, solid in solids(raster, boxes))
@@ -152,12 +148,12 @@ def with_terrain(
         stand = counted(len(boxes), "box stands", "boxes stand")
         notes.append(
             f"{stand} for {counted(cells, 'cell')} of {smooth.step:g} m with objects above {MIN_ABOVE:g} m in "
-            f"{path.name}: this changes {chosen_merging(tried).changed:.2%} of {RAYS:,} random lines of sight"
+            f"{path.name}: this changes {changed:.2%} of {RAYS:,} random lines of sight"
         )
     if dropped:
         notes.append(f"{counted(dropped, 'building')} of the extract replaced by those of the survey")
     relief = Relief(smooth, level) if is_flat else None
-    return replace(description, relief=relief, solids=(*description.solids, *added)), tuple(notes), tried
+    return replace(description, relief=relief, solids=(*description.solids, *added)), tuple(notes)
 
 
 def _heights_note(path: Path, smooth: HeightRaster) -> str:

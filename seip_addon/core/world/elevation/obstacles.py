@@ -59,15 +59,6 @@ class Box:
     top: float
 
 
-@dataclass(frozen=True)
-class Merging:
-    """Number of boxes for a tolerance (metres), and share of random rays that these boxes block differently."""
-
-    tolerance: float
-    boxes: int
-    changed: float
-
-
 def obstacle_raster(ground: HeightRaster, points: Float, classes: Integer) -> ObstacleRaster:
     """Return the obstacles on the ground from the points of a survey.
 
@@ -147,24 +138,16 @@ def of_boxes(raster: ObstacleRaster, boxes: Sequence[Box]) -> ObstacleRaster:
     return ObstacleRaster(raster.ground, kind, low, top)
 
 
-def chosen_boxes(raster: ObstacleRaster, rng: np.random.Generator) -> tuple[tuple[Box, ...], tuple[Merging, ...]]:
-    """Return the fewest boxes that change at most `MAX_CHANGED` of random lines of sight, and all tolerances tried."""
+def chosen_boxes(raster: ObstacleRaster, rng: np.random.Generator) -> tuple[tuple[Box, ...], float]:
+    """Return the fewest boxes that change at most `MAX_CHANGED` of random lines of sight, and the share they change."""
     begin, end = random_rays(raster, rng)
     true = blocked(raster, begin, end)
-    choices = [merged(raster, tolerance) for tolerance in TOLERANCES]
-    changed = [
-        np.mean(blocked(of_boxes(raster, boxes), begin, end) != true) if len(begin) else 0.0 for boxes in choices
-    ]
-    tried = tuple(
-        Merging(tolerance, len(boxes), float(share))
-        for tolerance, boxes, share in zip(TOLERANCES, choices, changed, strict=True)
-    )
-    return choices[tried.index(chosen_merging(tried))], tried
-
-
-def chosen_merging(tried: Sequence[Merging]) -> Merging:
-    """Return the coarsest merging that changes few enough lines of sight; a tolerance of zero changes none."""
-    return next(one for one in tried if one.changed <= MAX_CHANGED)
+    for tolerance in TOLERANCES:  # boxes of the last one, zero, change nothing
+        boxes = merged(raster, tolerance)
+        changed = float(np.mean(blocked(of_boxes(raster, boxes), begin, end) != true)) if len(begin) else 0.0
+        if changed <= MAX_CHANGED:
+            break
+    return boxes, changed
 
 
 def random_rays(raster: ObstacleRaster, rng: np.random.Generator) -> tuple[Float, Float]:

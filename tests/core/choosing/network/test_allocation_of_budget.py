@@ -12,7 +12,7 @@ from seip_addon.core.base.progress import Progress, finish
 from seip_addon.core.choosing.network import network_search
 from seip_addon.core.choosing.network.allocation import allocate, allocation_of, relaxed_allocation
 from seip_addon.core.choosing.network.frontier import Frontier, Options, SolvedBudget, possible_amounts
-from seip_addon.core.choosing.network.network_search import Goal, search_allocations
+from seip_addon.core.choosing.network.network_search import search_allocation
 
 MOST = 3
 
@@ -88,10 +88,9 @@ def test_search_finds_the_best_allocation_of_each_budget(seed):
     rng = np.random.default_rng(seed)
     sites = [EnumeratedSite(rng) for _ in range(3)]
     weights, budgets = rng.choice([0.5, 1.0, 3.0], size=3), (rng.integers(1, 90, size=4) * 1000.0).tolist()
-    known = [site.frontier(max(budgets)) for site in sites]
-    goals = [Goal(budget, 0.0) for budget in budgets]
-    results = finish(search_allocations(known, weights, goals, solver(sites, 0.05)))
-    for budget, found in zip(budgets, results, strict=True):
+    for budget in budgets:
+        known = [site.frontier(budget) for site in sites]
+        found = finish(search_allocation(known, weights, budget, 0.0, solver(sites, 0.05)))
         best = best_of_all(sites, weights, budget)
         assert found.value == pytest.approx(best, rel=1e-9)
         assert found.bound >= best * (1 - 1e-9)
@@ -108,7 +107,7 @@ def test_the_relaxation_of_very_many_sites_loses_less_than_one_site(monkeypatch,
     sites = [EnumeratedSite(rng) for _ in range(4)]
     weights, budget = rng.choice([0.5, 1.0, 3.0], size=4), float(rng.integers(20, 90) * 1000)
     known = [site.frontier(budget) for site in sites]
-    (found,) = finish(search_allocations(known, weights, [Goal(budget, 0.0)], solver(sites, 0.05)))
+    found = finish(search_allocation(known, weights, budget, 0.0, solver(sites, 0.05)))
     best = best_of_all(sites, weights, budget)
     dearest = max(weight * one.ceiling for weight, one in zip(weights, known, strict=True))
     assert best - dearest <= found.value <= best * (1 + 1e-9)
@@ -123,7 +122,7 @@ def test_a_search_that_ends_early_has_a_bound_that_holds(seed):
     sites = [EnumeratedSite(rng) for _ in range(4)]
     weights, budget = np.ones(4), float(rng.integers(20, 90) * 1000)
     known = [site.frontier(budget) for site in sites]
-    (found,) = finish(search_allocations(known, weights, [Goal(budget, 0.2)], solver(sites, 0.1)))
+    found = finish(search_allocation(known, weights, budget, 0.2, solver(sites, 0.1)))
     best = best_of_all(sites, weights, budget)
     assert found.value <= best * (1 + 1e-9)
     assert found.bound >= best * (1 - 1e-9)

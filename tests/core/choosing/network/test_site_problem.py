@@ -37,19 +37,6 @@ def test_solved_budget_is_the_best_of_all_placements(criterion, seed):
         assert found.value == pytest.approx(problem.value(found.chosen))
 
 
-def test_cheapest_reaches_the_coverage_at_the_least_price():
-    problem = random_problem(4, "road")
-    found, least = finish(problem.cheapest(0.5, 10.0))
-    prices = [
-        problem.prices[list(chosen)].sum()
-        for number in range(1, 4)
-        for chosen in itertools.combinations(range(9), number)
-        if len(set(problem.positions[list(chosen)].tolist())) == number and problem.coverage(chosen) >= 0.5
-    ]
-    assert found.price == least == min(prices)
-    assert problem.coverage(found.chosen) >= 0.5
-
-
 def test_file_keeps_everything(tmp_path):
     problem = random_problem(1, "returns")
     problem.save(tmp_path / "problem.npz", {"key": "a key"})

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import fields, replace
 
-from headless.studies.full_frames import SLACK, combined, differing, full_scan
+from headless.studies.benchmark.scans import SLACK, combined, differing, full_scan
 
 import numpy as np
 import pytest

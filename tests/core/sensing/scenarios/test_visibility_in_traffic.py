@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from headless.studies.full_scan import seen_by_tilted_full_scan
+from headless.studies.benchmark.visibility import seen_by_tilted_full_scan
 
 import numpy as np
 import pytest

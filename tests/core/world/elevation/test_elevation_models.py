@@ -29,7 +29,7 @@ def plane(x, y):
 
 def relief(path, reference=MAP, lanes=FLAT, area=AREA):
     around = MapSurroundings(reference, area, lanes)
-    site, _, _ = finish(with_terrain(SiteDescription(), TerrainRequest(path), around))
+    site, _ = finish(with_terrain(SiteDescription(), TerrainRequest(path), around))
     return site.relief
 
 

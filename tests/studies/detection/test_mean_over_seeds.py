@@ -1,6 +1,6 @@
 """Intervals of means over seeds."""
 
-from headless.studies.mean_over_seeds import mean_interval
+from headless.studies.detection.claims import mean_interval
 
 import numpy as np
 import pytest

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from headless.studies.random_sites.companions import with_companions
+from headless.studies.site_training.companions import with_companions
 
 import numpy as np
 import pytest

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Generator
 from dataclasses import replace
 
+from headless.studies.random_sites.varied_bodies import draw_size
+
 import numpy as np
 
 from seip_addon.core.base.progress import Progress
 from seip_addon.core.sensing.traffic.overlaps import find_overlaps
 from seip_addon.core.sensing.traffic.trajectories import SAMPLED, RoadUser, Trajectories, some_users
-
-from .varied_bodies import draw_size
 
 IN_COMPANY = 0.4
 """Share of the pedestrians who have companions."""
