@@ -90,7 +90,7 @@ def _cells(model: LidarModel) -> tuple[str, ...]:
     across = math.degrees(model.field_of_view)
     return (
         sensor_types.title(model),
-        "rosette" if model.rosette is not None else f"{model.channels}",
+        f"{model.channels}",
         f"{across:.0f}° × {high - low:.0f}°",
         f"{pedestrian_range(model):.0f} m",
         f"${model.price:,.0f}",
@@ -220,23 +220,14 @@ def _on_road(model: LidarModel, heights: list[float], delta: float) -> list[tupl
 def _figures(model: LidarModel) -> list[tuple[str, str]]:
     low, high = math.degrees(model.elevations.min()), math.degrees(model.elevations.max())
     cheap, dear = model.price_range
-    reach = [
+    return [
+        ("Channels", f"{model.channels}"),
+        ("Elevations", f"{low:.4g}…{high:.4g}°"),
         ("Range", f"{model.min_range:g}…{model.max_range:g} m"),
         ("On a pedestrian", f"up to {pedestrian_range(model):.0f} m"),
         ("Points", f"{model.points_per_second:,.0f} /s"),
-    ]
-    if model.rosette is None:
-        beams = [
-            ("Channels", f"{model.channels}"),
-            ("Elevations", f"{low:.4g}…{high:.4g}°"),
-            *reach,
-            ("Rotation", f"{model.rotation_rate:g} Hz"),
-            ("Azimuth", f"{math.degrees(model.azimuth_step):.2g}°"),
-        ]
-    else:
-        beams = [("Pattern", "rosette"), *reach, ("Accumulated", f"{1 / model.rotation_rate:g} s")]
-    return [
-        *beams,
+        ("Rotation", f"{model.rotation_rate:g} Hz"),
+        ("Azimuth", f"{math.degrees(model.azimuth_step):.2g}°"),
         ("Field of view", f"{math.degrees(model.field_of_view):.4g}°"),
         ("Price", f"${cheap:,.0f}" if cheap == dear else f"${cheap:,.0f}…{dear:,.0f}"),
     ]

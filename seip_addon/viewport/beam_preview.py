@@ -47,7 +47,7 @@ class Preview:
         matrix = np.array(self.matrix).reshape(4, 4)
         place, axes = matrix[:3, 3], self.axes
         ground = float(place[2]) - self.height + LIFT
-        return beam_rings(self.model, place, axes, ground, 2 * self.delta, self.resolved_to())
+        return beam_rings(self.model, place, axes, ground, 2 * self.delta)
 
     @property
     def axes(self) -> Float:
@@ -57,10 +57,7 @@ class Preview:
         return axes
 
     def resolved_to(self) -> float:
-        """Return the radius, metres, to which all rings before the sensor are within 2δ of each other.
-
-        Of a rosette: to which all road in view has a ray of the frame within δ.
-        """
+        """Return the radius, metres, to which all rings before the sensor are within 2δ of each other."""
         across = math.sqrt(max(self.model.max_range**2 - self.height**2, 0.0))
         return unresolved_from(self.model, self.height, self.delta, across, self.tilt)
 
@@ -111,13 +108,11 @@ def _legend(_scene: bpy.types.Scene) -> Block | None:
     preview = preview_of(bpy.context)
     if preview is None:
         return None
-    rosette = preview.model.rosette is not None
-    gap = preview.delta if rosette else 2 * preview.delta
     where = f"in front up to {preview.resolved_to():.0f} m" if preview.tilt else f"up to {preview.resolved_to():.0f} m"
     return Block(
         f"{preview.model.name} at {preview.height:.3g} m: no gaps on a level road {where}",
         (
-            Entry(f"at most {gap:.3g} m to {'a ray' if rosette else 'the next ring inwards'}", (DENSE,)),
+            Entry(f"at most {2 * preview.delta:.3g} m to the next ring inwards", (DENSE,)),
             Entry("more: road between may go unseen", (WIDE,)),
             Entry("edge of the field of view", (CONE,)),
         ),

@@ -123,9 +123,7 @@ def test_the_cache_is_emptied_of_grids_alone(survey):
         bpy.ops.seip.empty_cache()
     folder.mkdir(parents=True)
     (folder / f"{'a' * 32}.npz").write_bytes(b"x" * 1000)
-    pieces = folder / f"{'b' * 32}.pieces"
-    pieces.mkdir()
-    (pieces / "1.npz").write_bytes(b"x" * 500)
+    (folder / f"{'b' * 32}.returns.npz").write_bytes(b"x" * 500)
     (folder / "mine.txt").write_text("mine", encoding="utf-8")
     assert bpy.ops.seip.empty_cache() == {"FINISHED"}
     assert [entry.name for entry in folder.iterdir()] == ["mine.txt"]

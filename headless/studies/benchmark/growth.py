@@ -16,10 +16,9 @@ import numpy as np
 
 from seip_addon.core.base.arrays import Float
 from seip_addon.core.sensing.lidar.model import LidarModel
-from seip_addon.core.sensing.visibility.chunks import compute_rows
+from seip_addon.core.sensing.visibility.grid import seen_from
 from seip_addon.core.sensing.visibility.ray_casting import make_ray_caster
 from seip_addon.core.sensing.visibility.settings import VisibilitySettings
-from seip_addon.core.sensing.visibility.triangle_culling import needed_triangles
 from seip_addon.core.sensing.visibility.visibility_model import VisibilityModel
 from seip_addon.core.site.site import Site
 
@@ -110,18 +109,15 @@ def visibility_cost(
     represents.
     """
     poses = site.candidates
-    longest = max(model.max_range for model in models.values())
     for_site, for_positions = Expense(), Expense()
 
     def make_model() -> VisibilityModel:
-        needed = needed_triangles(site.triangles, poses.xyz, site.targets.xyz, settings.delta, longest)
-        caster = make_ray_caster(site.triangles, keep=needed.keep)
-        return VisibilityModel(site.targets.xyz, site.reflectivity, settings, caster)
+        return VisibilityModel(site.targets.xyz, site.reflectivity, settings, make_ray_caster(site.triangles))
 
     def work() -> None:
         model = for_site.time(make_model)
         for group in sampled_positions(site, samples):
-            for_positions.time(partial(compute_rows, model, poses, models, group))
+            for_positions.time(partial(seen_from, model, poses, models, group))
 
     _, memory = peak_memory(work)
     return for_site.cpu + for_positions.cpu * positions_per_sample, memory

@@ -15,7 +15,7 @@ import numpy as np
 from seip_addon.core.base.arrays import Boolean, Integer
 from seip_addon.core.base.errors import SeipError
 from seip_addon.core.sensing.lidar.model import LidarModel
-from seip_addon.core.sensing.visibility.chunks import compute_rows, sharing_rays
+from seip_addon.core.sensing.visibility.grid import seen_from, sharing_rays
 from seip_addon.core.sensing.visibility.near_surfaces import near_surfaces
 from seip_addon.core.sensing.visibility.ray_casting import make_ray_caster
 from seip_addon.core.sensing.visibility.scanning import ScanPosition
@@ -108,9 +108,8 @@ def _full_and_lazy(
         position = ScanPosition(caster, candidates.xyz[first], yaw, used, settings, site.reflectivity)
         full_grid, rays = full.expense.time(partial(seen_by_tilted_full_scan, position, tilt, surfaces))
         full.add(rays, full_grid)
-        rows = lazy.expense.time(partial(compute_rows, lazy_model, candidates, models, poses))
-        lazy_grid = np.unpackbits(rows.packed, axis=1, count=lazy_model.targets).astype(bool)
-        lazy.add(rows.rays, lazy_grid)
+        lazy_grid, rays = lazy.expense.time(partial(seen_from, lazy_model, candidates, models, poses))
+        lazy.add(rays, lazy_grid)
         if (full_grid != lazy_grid).any():
             raise SeipError(f"pose {first}: the lazy {name} grid differs from the full scan: a defect")
     return {f"full {name}": full, f"lazy {name}": lazy}

@@ -208,25 +208,7 @@ class Scanner:
         self.sensor, self._ground, self.threads = sensor, ground, ground.caster.threads
         self.delay = sensor.model.delay(np.arange(sensor.model.channels * sensor.model.azimuth_count))
         self._model = sensor.model
-        self._cast_at_ground()
-
-    def for_other_traffic(self) -> Scanner:
-        """Return a scanner of the same sensor that shares what was cast at the static scene, not at road users."""
-        other = copy(self)
-        other._still_hits = {}  # noqa: SLF001  # its own kind
-        return other
-
-    def aim(self, time: float) -> None:
-        """Set the rays to their directions in the frame that begins at a time in seconds; only a rosette's change."""
-        # the cached static scan is valid for one pattern only
-        model = self.sensor.model.at(time)
-        if model.rosette != self._model.rosette:
-            self._model = model
-            self._cast_at_ground()
-
-    def _cast_at_ground(self) -> None:
-        """Cast all rays against the static scene, and keep the result for all frames of this pattern."""
-        sensor, rays = self.sensor, np.arange(len(self.delay))
+        rays = np.arange(len(self.delay))
         self._windows = BeamWindows(self._model)
         self.directions: Float = BeamPattern(self._model).directions(rays) @ sensor.orientation.T
         self.coarse_directions: NDArray[np.float32] = self.directions.astype(np.float32)
@@ -238,8 +220,13 @@ class Scanner:
             hits = self._cast(self._ground, sensor.xyz, self.directions[part], rays[part])
             self._distance[hits.ray], self._chance[hits.ray] = hits.distance, hits.chance
             self._intensity[hits.ray] = self._model.law.intensity(hits.distance, hits.reflected)
-        # stationary road users were hit by the rays of the earlier pattern: these hits are no longer valid
         self._still_hits: dict[int, tuple[Motion, _Hits]] = {}
+
+    def for_other_traffic(self) -> Scanner:
+        """Return a scanner of the same sensor that shares what was cast at the static scene, not at road users."""
+        other = copy(self)
+        other._still_hits = {}  # noqa: SLF001  # its own kind
+        return other
 
     @property
     def sees_nothing(self) -> bool:

@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...base.arrays import Boolean, Float, Integer, concatenated_ranges
-from ...base.progress import Progress
+from ...base.progress import Progress, each_in_threads
 from ..lidar.beams import BeamPattern
 from ..scans.beam_culling import BeamWindows
 from ..scans.sensor import level_orientation
@@ -25,7 +25,7 @@ from ..visibility.ray_casting import RayCaster, engine_name, make_ray_caster
 from ..visibility.scanning import ScanPosition
 from ..visibility.surroundings import Surroundings
 from ..visibility.target_index import TargetIndex
-from .scenario_visibility import ScenarioVisibility, each_in_threads
+from .scenario_visibility import ScenarioVisibility
 from .traffic_instants import TrafficObstacles
 
 _RAYS_AT_ONCE = 1 << 17  # bounds the memory of a full scan

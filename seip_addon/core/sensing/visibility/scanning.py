@@ -6,14 +6,10 @@ each of them. The same result as that of full scans is found with few rays:
 
 1. Only rays that can return from near a target are cast (`beam_culling`).
 2. For each sensor and target, the first is the one that should end nearest to the target.
-3. For targets not seen yet, bundles of neighbouring rays follow, each aimed at one surface near one target. A bundle is
-   dropped when its target is seen, or when the triangle that stopped a ray next to it is proven to stop all of its rays
-   (`occlusion`). Otherwise its middle ray is cast, and the two halves become new bundles.
+3. For targets not seen yet, bundles of neighbouring rays follow. The middle ray of a bundle is cast, and the two halves
+   become new bundles, until the target is seen.
 
 No ray is cast twice, neither for two targets nor for two sensors that share it.
-
-The rays of a rosette have no neighbours in rows: all of them that can return from near a target are cast
-(`ray_culling`).
 """
 
 from __future__ import annotations
@@ -27,11 +23,9 @@ from ...base.arrays import Boolean, Float, Integer, concatenated_ranges
 from ...geometry.orientation import rotated
 from ..lidar.beams import BeamPattern
 from ..lidar.model import LidarModel
-from .beam_culling import Beams, NearRays, disc_patches, may_return, near_rays, target_patches
+from .beam_culling import Beams, NearRays, may_return, near_rays, target_patches
 from .near_surfaces import NearSurfaces
-from .occlusion import stopped_by
 from .ray_casting import RayCaster
-from .ray_culling import rays_near
 from .settings import VisibilitySettings
 from .target_index import TargetIndex, is_within, squared_length
 
@@ -121,7 +115,7 @@ class ScanPosition:
         -------
         (n,) bool
         """
-        least, cuts = self.settings.least_strength(model), surfaces.discs.cuts
+        least, cuts = self.settings.least_strength(model), surfaces.cuts
         strong = np.ones(len(target), dtype=bool)
         if least == 0:
             return strong
@@ -189,69 +183,27 @@ def seen_by_near_rays(position: ScanPosition, surfaces: NearSurfaces) -> tuple[B
     cast : int
         Number of rays.
     """
-    # Bundles need rows of neighbouring rays. The rays of a rosette are not in rows: of these, each one that can return
-    # from near some target is cast.
-    with_channels = [model for model in position.models if model.rosette is None]
-    if len(with_channels) == len(position.models):
-        return _seen_by_channels(position, surfaces)
-    seen, cast = np.zeros((len(position.models), len(surfaces.xyz)), dtype=bool), 0
-    if with_channels:
-        of_these = np.array([model.rosette is None for model in position.models])
-        seen[of_these], cast = _seen_by_channels(replace(position, models=with_channels), surfaces)
-    index = TargetIndex(surfaces.xyz, position.settings.delta)
-    patches = target_patches(position.origin, surfaces, np.ones(len(surfaces.xyz), dtype=bool))
-    for number, model in enumerate(position.models):
-        if model.rosette is not None:
-            rays = rays_near(patches, position.yaw + model.azimuth_offsets, model.elevations, model.max_range)
-            seen[number] = seen_by_rays(position, model, rays, surfaces, index)
-            cast += len(rays)
-    return seen, cast
-
-
-def _seen_by_channels(position: ScanPosition, surfaces: NearSurfaces) -> tuple[Boolean, int]:
-    """Find the targets seen by sensors whose rays are the azimuth steps of channels; see `seen_by_near_rays`."""
-    beams = Beams.of(position.models, position.yaw, position.settings)
+    beams = Beams.of(position.models, position.yaw)
     returns = _Returns(position, beams, surfaces)
     seen = np.zeros((len(position.models), len(surfaces.xyz)), dtype=bool)
-
-    # First the likeliest ray for each sensor and target: most targets that can be seen are seen by it, and need no
-    # more. Patches of whole targets are enough for that choice.
-    possible = may_return(position.origin, surfaces, beams)
-    first = near_rays(beams, target_patches(position.origin, surfaces, possible.any(axis=0)))
-    first = first.pick(possible[beams.sensor[first.channel], first.target]).likeliest(beams.sensor)
-    sees, triangle = returns.see(first)
-    seen[beams.sensor[first.channel], first.target] = sees
-    # A target without any ray at this stage has no bundles later either: those are subsets of the same rays.
-    unseen = np.zeros(len(surfaces.xyz), dtype=bool)
-    unseen[first.target[~sees]] = True
-    blocker = np.full(seen.shape, -1)
-    blocker[beams.sensor[first.channel], first.target] = triangle
-
-    # Then the bundles for the rest, by the tighter patches of single surfaces. Each bundle carries the triangle that
-    # stopped the last ray cast for it: this is the likeliest one to stop all of it.
-    patches, planes = disc_patches(position.origin, surfaces, unseen)
-    bundles = near_rays(beams, patches, planes)
-    still_open = possible & ~seen
-    bundles = bundles.pick(np.flatnonzero(still_open[beams.sensor[bundles.channel], bundles.target]))
-    triangle = blocker[beams.sensor[bundles.channel], bundles.target]
-    # Each round splits bundles in halves, so that the rounds are few: the logarithm of the widest one. All middle rays
-    # of a round are cast together, which the casters need to be fast. The loop ends when every ray of every bundle is
-    # cast, proven to be stopped, or of no use since its target is seen. So nothing is missed.
-    while len(bundles):
-        # Proven before anything is cast: on a scene with large occluders one triangle may stop a whole bundle, at
-        # the price of a few products. Bundles without a triangle (their last ray met nothing) cannot be proven.
-        stopped = (triangle >= 0) & (bundles.width > 1)  # a single ray is cast as quickly as it is proven stopped
-        corners = position.corners(triangle[stopped])
-        stopped[stopped] = stopped_by(position.origin, corners, beams, bundles.pick(stopped), planes)
-        bundles = bundles.pick(~stopped)
-        sees, triangle = returns.see(bundles)
-        seen[beams.sensor[bundles.channel[sees]], bundles.target[sees]] = True
-        # Another bundle of the same sensor may have seen the target in this round: looking at `seen` drops its bundles
-        # too. Halves inherit the triangle that stopped the middle ray between them.
-        unseen = np.flatnonzero(~seen[beams.sensor[bundles.channel], bundles.target])
-        bundles, part_of = bundles.pick(unseen).beside_middle()
-        triangle = triangle[unseen][part_of]
+    possible = may_return(position.origin, surfaces, position.models, position.settings)
+    bundles = near_rays(beams, target_patches(position.origin, surfaces, possible.any(axis=0)))
+    bundles = bundles.pick(possible[beams.sensor[bundles.channel], bundles.target])
+    # First the likeliest ray for each sensor and target: most targets that can be seen are seen by it.
+    _note_seen(seen, beams, returns, bundles.likeliest(beams.sensor))
+    # Then the bundles of the rest. Each round splits bundles in halves, so that the rounds are few: the logarithm of
+    # the widest one. All middle rays of a round are cast together, which the casters need to be fast. The loop ends
+    # when every ray of every bundle is cast, or of no use since its target is seen. So nothing is missed.
+    while len(bundles := bundles.pick(~seen[beams.sensor[bundles.channel], bundles.target])):
+        _note_seen(seen, beams, returns, bundles)
+        bundles = bundles.beside_middle()
     return seen, returns.cast
+
+
+def _note_seen(seen: Boolean, beams: Beams, returns: _Returns, bundles: NearRays) -> None:
+    """Note the targets that the middle rays of bundles see, in an array (models, t) bool."""
+    sees = returns.see(bundles)
+    seen[beams.sensor[bundles.channel[sees]], bundles.target[sees]] = True
 
 
 def seen_by_rays(
@@ -301,32 +253,23 @@ class _Returns:
         """Number of rays that have been cast."""
         return len(self._distance) - 1
 
-    def see(self, bundles: NearRays) -> tuple[Boolean, Integer]:
-        """Find the bundles whose middle rays return from nearer than δ to their targets, strongly enough.
-
-        Returns
-        -------
-        sees : (k,) bool
-            Whether the middle ray of each bundle sees the bundle's target.
-        triangle : (k,) int64
-            Triangle that stops the ray; -1 for none.
-        """
+    def see(self, bundles: NearRays) -> Boolean:
+        """Return the bundles whose middle rays return from nearer than δ to their targets, strongly enough, (k,)."""
         # all-round bundles may run over step 0, where steps are negative or beyond the last one
         row = self._rows(bundles.channel, bundles.middle % self._beams.steps[bundles.channel])
         gap = self._point[row] - self._surfaces.xyz[bundles.target]
         sees = is_within(squared_length(gap), self._position.settings.delta)
-        triangle = self._triangle[row]
         # the few rays that end near their target are also checked for range and strength, by the law of each sensor
         near = np.flatnonzero(sees)
         for number, model in enumerate(self._position.models):
             own = near[self._beams.sensor[bundles.channel[near]] == number]
             directions, distance = self._direction[row[own]], self._distance[row[own]]
-            counts = self._position.counting(model, directions, distance, triangle[own])
+            counts = self._position.counting(model, directions, distance, self._triangle[row[own]])
             counts[counts] = self._position.counting_at_borders(
                 model, self._surfaces, directions[counts], distance[counts], bundles.target[own[counts]]
             )
             sees[own] = counts
-        return sees, triangle
+        return sees
 
     def _rows(self, channel: Integer, step: Integer) -> Integer:
         """Return the rows of rays in the arrays, after casting those that are new."""
