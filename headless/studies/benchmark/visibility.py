@@ -15,12 +15,12 @@ import numpy as np
 from seip_addon.core.base.arrays import Boolean, Integer
 from seip_addon.core.base.errors import SeipError
 from seip_addon.core.sensing.lidar.model import LidarModel
-from seip_addon.core.sensing.visibility.grid import seen_from, sharing_rays
+from seip_addon.core.sensing.visibility.grid import seen_from
 from seip_addon.core.sensing.visibility.near_surfaces import near_surfaces
 from seip_addon.core.sensing.visibility.ray_casting import make_ray_caster
 from seip_addon.core.sensing.visibility.scanning import ScanPosition
 from seip_addon.core.sensing.visibility.settings import Engine, VisibilitySettings
-from seip_addon.core.sensing.visibility.visibility_model import VisibilityModel
+from seip_addon.core.sensing.visibility.visibility_model import VisibilityModel, sharing_rays
 from seip_addon.core.site.site import Site
 
 ENGINES: tuple[Engine, ...] = ("bvh", "embree")

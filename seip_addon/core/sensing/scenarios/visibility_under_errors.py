@@ -7,10 +7,9 @@ import numpy as np
 from ...base.arrays import Integer
 from ...base.progress import Progress, each_in_threads
 from ...geometry.orientation import orientations
-from ..visibility.grid import sharing_rays
 from ..visibility.ray_casting import engine_name, make_ray_caster
 from ..visibility.surroundings import Surroundings
-from ..visibility.visibility_model import VisibilityModel
+from ..visibility.visibility_model import VisibilityModel, sharing_rays
 from .pose_errors import PoseErrors, draw_errors, out_of_objects
 from .scenario_visibility import ScenarioVisibility
 

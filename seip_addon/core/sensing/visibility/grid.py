@@ -29,7 +29,7 @@ from ..lidar.catalogue import find_models
 from ..lidar.model import LidarModel
 from .ray_casting import engine_name, make_ray_caster
 from .settings import Engine, VisibilitySettings
-from .visibility_model import VisibilityModel
+from .visibility_model import VisibilityModel, sharing_rays
 
 FILE = ArrayFile(
     "seip.visibility",
@@ -133,27 +133,6 @@ def visibility_key(site: Site, models: Mapping[str, LidarModel], settings: Visib
     if site.candidates.tilt.any():
         inputs.append(site.candidates.tilt)
     return digest(*inputs)
-
-
-def sharing_rays(xyz: Float, yaw: Float, tilt: Float) -> list[Integer]:
-    """Group poses that have position, yaw and tilt in common: their sensors can share rays.
-
-    Parameters
-    ----------
-    xyz : (c, 3) float64, metres
-    yaw, tilt : (c,) float64, radians
-
-    Returns
-    -------
-    list of (k,) int64
-        Indices of the poses of each group, in the order of their first poses.
-    """
-    _, first, group = np.unique(np.column_stack([xyz, yaw, tilt]), axis=0, return_index=True, return_inverse=True)
-    # np.unique numbers the groups by their coordinates; the rank of a group's first pose renumbers them in the order of
-    # the candidates. A stable sort by group then keeps that order within each group.
-    rank = np.argsort(np.argsort(first))[group.ravel()]
-    order = np.argsort(rank, kind="stable")
-    return np.split(order, np.cumsum(np.bincount(rank))[:-1])
 
 
 def seen_from(

@@ -9,7 +9,9 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from ...base.arrays import Boolean, Float
+import numpy as np
+
+from ...base.arrays import Boolean, Float, Integer
 from ...site.site import Site
 from ..lidar.model import LidarModel
 from .near_surfaces import near_surfaces, rotated_surfaces
@@ -95,6 +97,27 @@ def visibility_model(site: Site, settings: VisibilitySettings, engine: Engine = 
     """Return a visibility model with a ray caster of its own."""
     caster = make_ray_caster(site.triangles, engine_name(engine))
     return VisibilityModel(site.targets.xyz, site.reflectivity, settings, caster)
+
+
+def sharing_rays(xyz: Float, yaw: Float, tilt: Float) -> list[Integer]:
+    """Group poses that have position, yaw and tilt in common: their sensors can share rays.
+
+    Parameters
+    ----------
+    xyz : (c, 3) float64, metres
+    yaw, tilt : (c,) float64, radians
+
+    Returns
+    -------
+    list of (k,) int64
+        Indices of the poses of each group, in the order of their first poses.
+    """
+    _, first, group = np.unique(np.column_stack([xyz, yaw, tilt]), axis=0, return_index=True, return_inverse=True)
+    # np.unique numbers the groups by their coordinates; the rank of a group's first pose renumbers them in the order of
+    # the candidates. A stable sort by group then keeps that order within each group.
+    rank = np.argsort(np.argsort(first))[group.ravel()]
+    order = np.argsort(rank, kind="stable")
+    return np.split(order, np.cumsum(np.bincount(rank))[:-1])
 
 
 def is_upright(orientation: Float) -> bool:
