@@ -481,13 +481,8 @@ def _read_sweep(path: Path, _: bytes) -> None:
 
 
 def _sensor_poses(_: Path) -> list[bytes]:
-    from seip_addon.core.output.datasets.formats import CALIBRATION  # noqa: PLC0415
-
     rows = [[0.0, -1.0, 0.0, 12.5], [1.0, 0.0, 0.0, -3.25], [0.0, 0.0, 1.0, 6.0], [0.0, 0.0, 0.0, 1.0]]
-    turned = {"rotation": [row[:3] for row in rows[:3]], "translation": [row[3:] for row in rows[:3]]}
-    listed = {"sensors": [{"id": "S1", "pose": rows}, {"name": "S2", "pose": rows}]}
-    block = "".join(f"S{number}:\n" + "".join(f"- {row}\n" for row in rows) for number in (1, 2))
-    return [*(json.dumps(one).encode() for one in ({"S1": rows}, turned, listed)), block.encode(), CALIBRATION.encode()]
+    return [json.dumps(one).encode() for one in ({"S1": rows}, {"S1": rows, "S2": rows})]
 
 
 def _read_poses(path: Path, _: bytes) -> None:
@@ -534,7 +529,6 @@ FORMATS = {
     },
     "sweep.pcd": Format(".pcd", _sweeps(".pcd"), _mutate_pcd, _read_sweep),
     "sweep.bin": Format(".bin", _sweeps(".bin"), _mutate_numbers, _read_sweep),
-    "sweep.pcd.bin": Format(".pcd.bin", _sweeps(".pcd.bin"), _mutate_numbers, _read_sweep),
     "sweep.npz": Format(".npz", _sweeps(".npz"), _mutate_npz, _read_sweep),
     "poses": Format(".json", _sensor_poses, mutated_text, _read_poses),
     "boxes": Format(".json", _box_labels, mutated_text, _read_box_labels),

@@ -83,7 +83,7 @@ class SEIP_PG_verification(bpy.types.PropertyGroup):
 
     recording: path_property(
         "Recording",
-        "Folder with a folder of sweeps for each sensor, named after it, or a .pcap of an Ouster sensor. "
+        "Folder with a folder of sweeps for each sensor, named after it. "
         "To choose a folder, open it and press Accept with no file chosen",
     )
     found: StringProperty(

@@ -56,9 +56,7 @@ def write_sweep_file(path, columns):
     """Write x, y, z, intensity and ring in the format of a path's suffix, as far as it holds them."""
     table = np.column_stack([column.astype("<f4") for column in columns.values()])
     name = path.name
-    if name.endswith(".pcd.bin"):
-        path.write_bytes(table.tobytes())
-    elif name.endswith(".bin"):
+    if name.endswith(".bin"):
         path.write_bytes(np.ascontiguousarray(table[:, :4]).tobytes())
     elif name.endswith(".pcd"):
         path.write_bytes(pcd_text(columns))

@@ -13,8 +13,13 @@ from seip_addon.core.output.results.verification_record import (
     RecordedChange,
     VerificationRecord,
 )
-from seip_addon.core.sensing.recordings.figures import CoverageSteps, Gain, ReturnShare
-from seip_addon.core.sensing.recordings.verification import InstalledSensor, RecordedBackground
+from seip_addon.core.sensing.recordings.verification import (
+    CoverageSteps,
+    Gain,
+    InstalledSensor,
+    RecordedBackground,
+    ReturnShare,
+)
 from seip_addon.core.storage.files import save_json
 from seip_addon.core.storage.json_dataclass import as_json
 

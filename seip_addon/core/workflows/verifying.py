@@ -26,12 +26,17 @@ from ..sensing.recordings.comparison import (
     gone_objects,
     new_objects,
 )
-from ..sensing.recordings.figures import CoverageSteps, Gain, ReturnShare
-from ..sensing.recordings.recording import Recording
+from ..sensing.recordings.recording import Recording, SensorRecording
 from ..sensing.recordings.registration import Registration, register
-from ..sensing.recordings.sensor_recording import SensorRecording
 from ..sensing.recordings.unit_gain import fitted_gain, return_shares
-from ..sensing.recordings.verification import InstalledSensor, RecordedBackground, Verification
+from ..sensing.recordings.verification import (
+    CoverageSteps,
+    Gain,
+    InstalledSensor,
+    RecordedBackground,
+    ReturnShare,
+    Verification,
+)
 from ..sensing.scans.scanner import ReflectiveSurface
 from ..sensing.scans.sensor import MountedSensor
 from ..sensing.scans.static_scene import StaticScene, static_scene

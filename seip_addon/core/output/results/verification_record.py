@@ -10,8 +10,7 @@ from pathlib import Path
 from typing import Literal
 
 from ...base.counts import counted
-from ...sensing.recordings.figures import CoverageSteps
-from ...sensing.recordings.verification import InstalledSensor
+from ...sensing.recordings.verification import CoverageSteps, InstalledSensor
 from ...site.locations import direction
 from ...storage.files import read_small
 from ...storage.json_dataclass import read_record

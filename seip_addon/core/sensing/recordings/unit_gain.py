@@ -12,9 +12,9 @@ from ...base.arrays import Boolean, Float, Integer
 from ...base.estimates import student_quantile
 from ..lidar.carla_dropoff import CarlaDropoff
 from ..lidar.noisy_returns import return_chance
-from .azimuth_sectors import sector_of
 from .comparison import AGREES, NOTHING, RayComparison
-from .figures import Gain, ReturnShare
+from .registration import sector_of
+from .verification import Gain, ReturnShare
 
 RANGE_EDGES = (0.0, 10.0, 20.0, 30.0, 40.0, 60.0, 80.0, 120.0, 200.0)
 """Edges of the ranges, in metres, for which shares of returns are given."""
