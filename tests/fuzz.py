@@ -205,24 +205,21 @@ def _read_catalogue(path: Path, _: bytes) -> None:
 
 
 def _floating_car_data(_: Path) -> list[bytes]:
-    from tests.builders.sumo_text import CONVERTED_CSV, FCD, NATIVE_CSV  # noqa: PLC0415
+    from tests.builders.sumo_text import FCD  # noqa: PLC0415
 
-    return [text.encode() for text in (FCD, NATIVE_CSV, CONVERTED_CSV)] + [gzip.compress(FCD.encode(), mtime=0)]
+    return [FCD.encode(), gzip.compress(FCD.encode(), mtime=0)]
 
 
 def _mutate_floating_car_data(random: Random, content: bytes) -> bytes:
     return mutated_bytes(random, content) if content.startswith(b"\x1f") else mutated_text(random, content)
 
 
-def _read_floating_car_data(path: Path, content: bytes) -> None:
+def _read_floating_car_data(path: Path, _: bytes) -> None:
     from seip_addon.core.base.progress import finish  # noqa: PLC0415
     from seip_addon.core.sensing.traffic.floating_car_data import read_floating_car_data, read_trajectories  # noqa: PLC0415
     from seip_addon.core.sensing.traffic.trajectories import Trajectories  # noqa: PLC0415
     from seip_addon.core.sensing.traffic.vehicle_types import BUILT_IN  # noqa: PLC0415
 
-    table = path.with_suffix(".csv")  # which form it is goes by the name
-    if not content.lstrip().startswith((b"<", b"\x1f")):
-        path = path.rename(table)
     data = finish(read_floating_car_data(path))
     got, _ = read_trajectories(data, BUILT_IN, np.zeros(3), "fuzz")
     ground = replace(got, position=np.where(np.isnan(got.position), 0.0, got.position))
