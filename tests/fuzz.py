@@ -494,15 +494,12 @@ def _read_poses(path: Path, _: bytes) -> None:
 
 def _box_labels(_: Path) -> list[bytes]:
     from seip_addon.core.output.datasets.formats import kitti_results, openpcdet_results  # noqa: PLC0415
-    from tests.builders.recording_files import dair_text, openlabel_text  # noqa: PLC0415
 
     kinds = ["car", "bus", "pedestrian"]
     boxes = np.array(
         [[10.0, -5.0, 0.8, 4.5, 1.8, 1.6, 0.3], [30, 4, 1.5, 12, 2.5, 3, -2], [7, 7, 0.9, 0.6, 0.7, 1.8, 1]]
     )
-    text = (openlabel_text(boxes.tolist(), kinds), dair_text(boxes.tolist(), kinds))
-    lines = [results(boxes, kinds, np.ones(3)) for results in (kitti_results, openpcdet_results)]
-    return [one.encode() for one in (*text, *lines)]
+    return [results(boxes, kinds, np.ones(3)).encode() for results in (kitti_results, openpcdet_results)]
 
 
 def _read_box_labels(path: Path, _: bytes) -> None:
@@ -528,7 +525,7 @@ FORMATS = {
     "sweep.bin": Format(".bin", _sweeps(".bin"), _mutate_numbers, _read_sweep),
     "sweep.npz": Format(".npz", _sweeps(".npz"), _mutate_npz, _read_sweep),
     "poses": Format(".json", _sensor_poses, mutated_text, _read_poses),
-    "boxes": Format(".json", _box_labels, mutated_text, _read_box_labels),
+    "boxes": Format(".txt", _box_labels, mutated_text, _read_box_labels),
     "blend": Format(".blend", _blends, _mutate_blend, _read_blend),
 }
 

@@ -1,6 +1,5 @@
 """Files of real sensors, written by hand: sweeps, poses and labels."""
 
-import json
 import struct
 
 import numpy as np
@@ -63,30 +62,3 @@ def write_sweep_file(path, columns):
     else:
         np.savez_compressed(path, **columns)
     return path
-
-
-def openlabel_text(boxes, kinds, frames=1):
-    """Return labels as TUMTraf has them; ``boxes`` are x, y, z, length, width, height, yaw."""
-    objects = {}
-    for number, ((x, y, z, length, width, height, yaw), kind) in enumerate(zip(boxes, kinds, strict=True)):
-        turn = [0.0, 0.0, np.sin(yaw / 2), np.cos(yaw / 2)]
-        cuboid = {"name": "shape3D", "val": [x, y, z, *turn, length, width, height], "attributes": {}}
-        objects[f"id-{number}"] = {"object_data": {"name": f"{kind}_{number}", "type": kind, "cuboid": cuboid}}
-    content = {"metadata": {"schema_version": "1.0.0"}, "coordinate_systems": {"s110_lidar_ouster_south": {}}}
-    content["frames"] = {str(frame): {"objects": objects, "frame_properties": {}} for frame in range(frames)}
-    return json.dumps({"openlabel": content})
-
-
-def dair_text(boxes, kinds):
-    """Return labels as DAIR-V2X has them, whose numbers are texts."""
-    return json.dumps(
-        [
-            {
-                "type": kind,
-                "3d_dimensions": {"h": repr(height), "w": repr(width), "l": repr(length)},
-                "3d_location": {"x": repr(x), "y": repr(y), "z": repr(z)},
-                "rotation": repr(yaw),
-            }
-            for (x, y, z, length, width, height, yaw), kind in zip(boxes, kinds, strict=True)
-        ]
-    )
