@@ -1,7 +1,5 @@
 """Files of real sensors, written by hand: sweeps, poses and labels."""
 
-import struct
-
 import numpy as np
 
 PCD_TYPES = {"f": "F", "i": "I", "u": "U"}
@@ -20,8 +18,6 @@ def make_points(seed=0, count=200):
 
 def pcd_text(columns, data="binary", viewpoint="0 0 0 1 0 0 0", **changes):
     """Return a PCD file of columns (n,) or (n, several), by PCL's description of the format."""
-    import lzf  # noqa: PLC0415  # a test's own library
-
     count = len(next(iter(columns.values())))
     parts = [np.asarray(column).reshape(count, *(column.shape[1:] or (1,))) for column in columns.values()]
     head = {
@@ -40,12 +36,8 @@ def pcd_text(columns, data="binary", viewpoint="0 0 0 1 0 0 0", **changes):
         body = "".join(
             " ".join(repr(value.item()) for part in parts for value in part[row]) + "\n" for row in range(count)
         ).encode()
-    elif data == "binary":
-        body = b"".join(part[row].tobytes() for row in range(count) for part in parts)
     else:
-        whole = b"".join(part.tobytes() for part in parts)
-        packed = lzf.compress(whole, 2 * len(whole) + 100) if whole else b""
-        body = struct.pack("<II", len(packed), len(whole)) + packed
+        body = b"".join(part[row].tobytes() for row in range(count) for part in parts)
     return (
         "# .PCD v0.7\n" + "".join(f"{key} {value}\n" for key, value in head.items() if value is not None)
     ).encode() + body

@@ -50,8 +50,8 @@ class FloatingCarData:
         Speed at each sample.
     elsewhere : int
         Number of further road users in the file that are never within the bounds.
-    riders, containers : int
-        Number of persons in vehicles, and of containers, which are left out.
+    riders : int
+        Number of persons in vehicles, who are left out.
     """
 
     names: tuple[str, ...]
@@ -64,7 +64,6 @@ class FloatingCarData:
     speed: Float
     elsewhere: int = 0
     riders: int = 0
-    containers: int = 0
 
 
 class Extent(NamedTuple):
@@ -203,7 +202,6 @@ class _Rows:
         self._vehicles_here: set[tuple[str, str]] = set()  # places of vehicles in this step, as the file writes them
         self._persons_here: list[tuple[str, tuple[str, str]]] = []
         self._riders: set[str] = set()
-        self._containers: set[str] = set()
         self._user = array("q")
         self._columns = [array("d") for _ in range(6)]
 
@@ -213,8 +211,6 @@ class _Rows:
             self.begin(attributes.get("time", ""))
         elif tag in ("vehicle", "person") and self._steps:
             self.add(attributes, walks=tag == "person")
-        elif tag == "container":
-            self._containers.add(attributes.get("id", ""))
 
     def begin(self, text: str) -> None:
         """Begin a step of the simulation."""
@@ -306,7 +302,6 @@ class _Rows:
             speed=speed,
             elsewhere=len(self._outside.difference(self._numbers)),
             riders=len(self._numbers) - len(keys),
-            containers=len(self._containers),
         )
 
     def _number(self, text: str, what: str, where: str, most: float) -> float:
@@ -342,6 +337,5 @@ def _missing_sizes(unknown: list[str], count: int) -> tuple[str, ...]:
 
 
 def _left_out(data: FloatingCarData) -> tuple[str, ...]:
-    found = [(data.riders, "person in a vehicle", "persons in vehicles"), (data.containers, "container", "containers")]
-    named = [counted(number, one, several) for number, one, several in found if number]
-    return (f"left out: {' and '.join(named)}",) if named else ()
+    riders = counted(data.riders, "person in a vehicle", "persons in vehicles")
+    return (f"left out: {riders}",) if data.riders else ()
