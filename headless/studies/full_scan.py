@@ -15,17 +15,13 @@ from seip_addon.core.sensing.visibility.visibility_model import is_upright, yaw_
 
 
 def seen_by_all_rays(position: ScanPosition, surfaces: NearSurfaces) -> tuple[Boolean, int]:
-    """Find the targets that are seen by casting every ray of every sensor: the reference."""
-    index = TargetIndex(surfaces.xyz, position.settings.delta)
-    rays = [np.arange(model.channels * model.azimuth_count) for model in position.models]
-    seen = [
-        seen_by_rays(position, model, own, surfaces, index) for model, own in zip(position.models, rays, strict=True)
-    ]
-    return np.array(seen), sum(map(len, rays))
+    """Find the targets that are seen by casting every ray: the reference."""
+    rays = np.arange(position.model.channels * position.model.azimuth_count)
+    return seen_by_rays(position, rays, surfaces, TargetIndex(surfaces.xyz, position.settings.delta)), len(rays)
 
 
 def seen_by_tilted_full_scan(position: ScanPosition, tilt: float, surfaces: NearSurfaces) -> tuple[Boolean, int]:
-    """Find the targets that sensors tilted by an angle (radians) see, by casting every ray: the reference."""
+    """Find the targets that a sensor tilted by an angle (radians) sees, by casting every ray: the reference."""
     if tilt == 0:
         return seen_by_all_rays(position, surfaces)
     orientation = orientation_of(position.yaw, tilt)

@@ -10,7 +10,7 @@ from typing import Any
 from headless.studies.benchmark.placement import ours
 from headless.studies.benchmark.resource_usage import Expense, in_fresh_process, peak_memory
 from headless.studies.benchmark.street_visibility import street_problem
-from headless.studies.benchmark.visibility import sampled_positions
+from headless.studies.benchmark.visibility import sampled_poses
 
 import numpy as np
 
@@ -71,7 +71,7 @@ def corridor_growth(
 ) -> Growth:
     """Measure visibility of corridors, which consist of copies of a site; samples are scaled up to all positions."""
     kilometres = float(np.ptp(site.triangles[:, :, 0])) / 1000
-    positions = len(sampled_positions(site, len(site.candidates)))
+    positions = len(sampled_poses(site, len(site.candidates)))
     costs = []
     for number in copies:
         scale = number * positions / samples
@@ -116,8 +116,8 @@ def visibility_cost(
 
     def work() -> None:
         model = for_site.time(make_model)
-        for group in sampled_positions(site, samples):
-            for_positions.time(partial(seen_from, model, poses, models, group))
+        for pose in sampled_poses(site, samples):
+            for_positions.time(partial(seen_from, model, poses, models, pose))
 
     _, memory = peak_memory(work)
     return for_site.cpu + for_positions.cpu * positions_per_sample, memory

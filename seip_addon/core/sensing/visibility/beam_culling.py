@@ -16,7 +16,6 @@ A target whose surfaces return too little light, wherever they are met, needs no
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
@@ -57,72 +56,6 @@ class Patches:
 
 
 @dataclass(frozen=True, eq=False)
-class Beams:
-    """The channels of all sensors at one position, one after the other.
-
-    Parameters
-    ----------
-    sensor : (c,) int64
-        Number of the sensor that has the channel.
-    elevation : (c,) float64, radians
-        Elevation of the channel.
-    zero : (c,) float64, radians
-        Azimuth of step 0.
-    steps : (c,) int64
-        Azimuth steps of a revolution or frame.
-    size : (c,) float64, radians
-        Size of a step.
-    all_round : (c,) bool
-        Whether step 0 follows the last one.
-    first_ray : (c,) int64
-        Number of the ray at step 0. Rays of the same direction have the same number.
-    min_range, max_range : (c,) float64, metres
-        Range of the sensor.
-    rays : int
-        Number of different rays.
-    """
-
-    sensor: Integer
-    elevation: Float
-    zero: Float
-    steps: Integer
-    size: Float
-    all_round: Boolean
-    first_ray: Integer
-    min_range: Float
-    max_range: Float
-    rays: int
-
-    @classmethod
-    def of(cls, models: Sequence[LidarModel], yaw: float) -> Beams:
-        """Join the channels of models that have the same yaw.
-
-        Channels with the same elevation, azimuth offset, number of steps and field of view have the same rays.
-        """
-        channels = [model.channels for model in models]
-        elevation = np.concatenate([model.elevations for model in models])
-        offset = np.concatenate([model.azimuth_offsets for model in models])
-        steps = np.repeat([model.azimuth_count for model in models], channels)
-        view = np.repeat([model.field_of_view for model in models], channels)
-        # Sensors of one family differ in range or sensitivity and have the same beams. Numbering rays by distinct
-        # channels lets such sensors share each cast ray.
-        kinds, kind = np.unique(np.column_stack([elevation, offset, steps, view]), axis=0, return_inverse=True)
-        end = np.cumsum(kinds[:, 2].astype(np.int64))
-        return cls(
-            sensor=np.repeat(np.arange(len(models)), channels),
-            elevation=elevation,
-            zero=yaw + offset + np.repeat([model.first_azimuth for model in models], channels),
-            steps=steps,
-            size=view / steps,
-            all_round=np.repeat([model.all_round for model in models], channels),
-            first_ray=(end - kinds[:, 2].astype(np.int64))[kind.ravel()],
-            min_range=np.repeat([model.min_range for model in models], channels),
-            max_range=np.repeat([model.max_range for model in models], channels),
-            rays=int(end[-1]),
-        )
-
-
-@dataclass(frozen=True, eq=False)
 class NearRays:
     """The rays that can return from near targets: bundles of neighbouring azimuth steps of a channel.
 
@@ -131,20 +64,17 @@ class NearRays:
     target : (k,) int64
         Target of each bundle.
     channel : (k,) int64
-        Channel of each bundle, as in `Beams`.
+        Channel of each bundle.
     first : (k,) int64
         First azimuth step; it may be negative or beyond the revolution if the channel goes all round.
     width : (k,) int64
         Number of steps, at least 1.
-    miss : (k,) float64, metres
-        Distance in plan between the middle of the patch and the middle of the channel's part in it.
     """
 
     target: Integer
     channel: Integer
     first: Integer
     width: Integer
-    miss: Float
 
     def __len__(self) -> int:
         return len(self.target)
@@ -158,21 +88,6 @@ class NearRays:
         """Return some of the bundles."""
         return NearRays(*(getattr(self, field.name)[which] for field in fields(self)))
 
-    def likeliest(self, sensor: Integer) -> NearRays:
-        """Return the bundle that should end nearest to the target, for each target and sensor.
-
-        Parameters
-        ----------
-        sensor : (c,) int64
-            Sensor of each channel.
-        """
-        # grouped minimum: one number for each pair of sensor and target; the first of equal bundles is taken
-        number = sensor[self.channel] * (self.target.max(initial=0) + 1) + self.target
-        least = np.full(number.max(initial=0) + 1, np.inf)
-        np.minimum.at(least, number, self.miss)
-        best = np.flatnonzero(self.miss == least[number])
-        return self.pick(best[np.unique(number[best], return_index=True)[1]])
-
     def beside_middle(self) -> NearRays:
         """Return the halves to the left and right of the middle rays."""
         # bundles of one ray have no halves and end here; those of two have one
@@ -184,10 +99,8 @@ class NearRays:
         return replace(self.pick(np.concatenate([right, left])), first=first, width=width)
 
 
-def may_return(
-    origin: Float, surfaces: NearSurfaces, models: Sequence[LidarModel], settings: VisibilitySettings
-) -> Boolean:
-    r"""Return the mask of targets from which returns can be strong enough for each sensor, (models, t) bool.
+def may_return(origin: Float, surfaces: NearSurfaces, model: LidarModel, settings: VisibilitySettings) -> Boolean:
+    r"""Return the mask of targets from which returns can be strong enough for a sensor, (t,) bool.
 
     It is true for all of these targets and for few others. A return lies off its plane, at the distance k, by at most
     the tolerance ε. A ray that meets the plane at r has the cosine k / r, so that the distance of the return differs
@@ -196,9 +109,12 @@ def may_return(
     Parameters
     ----------
     origin : (3,) float64, metres
-        Position of the sensors.
+        Position of the sensor.
     """
-    may = np.ones((len(models), len(surfaces.xyz)), dtype=bool)
+    least = settings.least_strength(model)
+    may = np.full(len(surfaces.xyz), least == 0)
+    if least == 0:
+        return may
     cuts, tolerance = surfaces.cuts, surfaces.tolerance
     away = cuts.middle - origin
     height = np.abs((away * cuts.normal).sum(axis=1))
@@ -206,14 +122,10 @@ def may_return(
     # A plane nearer than the tolerance gives x = 1 and an infinite reach: nothing is culled there. A quotient without a
     # value (0/0, inf - inf) also leaves the target. Errors are only allowed on this side.
     share = tolerance / np.maximum(height, tolerance)
-    for sensor, model in enumerate(models):
-        least = settings.least_strength(model)
-        if least > 0:
-            with np.errstate(divide="ignore", invalid="ignore"):
-                slack = (1 + share) / (1 - share) * (1 + _MARGIN)
-                beyond = nearest > model.law.farthest_on_planes(cuts.reflectivity, height, least) * slack
-            may[sensor] = False
-            may[sensor, cuts.target[~beyond]] = True
+    with np.errstate(divide="ignore", invalid="ignore"):
+        slack = (1 + share) / (1 - share) * (1 + _MARGIN)
+        beyond = nearest > model.law.farthest_on_planes(cuts.reflectivity, height, least) * slack
+    may[cuts.target[~beyond]] = True
     return may
 
 
@@ -226,16 +138,16 @@ def target_patches(origin: Float, surfaces: NearSurfaces, selected: Boolean) -> 
     return Patches(target, np.arctan2(y, x), np.hypot(x, y), radius, bottom, top)
 
 
-def near_rays(beams: Beams, patches: Patches) -> NearRays:
-    """Find the rays that can return from patches, as seen from the sensors.
+def near_rays(model: LidarModel, yaw: float, patches: Patches) -> NearRays:
+    """Find the rays of a sensor of a given yaw, in radians, that can return from patches.
 
     Returns
     -------
     NearRays
         All rays that can return from a patch, and few that cannot.
     """
-    patch, channel = _channels_at(beams, patches)
-    slope, distance, radius = np.tan(beams.elevation)[channel], patches.distance[patch], patches.radius[patch]
+    patch, channel = _channels_at(model, patches)
+    slope, distance, radius = np.tan(model.elevations)[channel], patches.distance[patch], patches.radius[patch]
     begin, end = _between_heights(slope, patches.bottom[patch], patches.top[patch])
     # fmax and fmin ignore NaN, the value of level beams within the heights: for these only the cylinder limits r
     begin = np.fmax(begin, np.maximum(distance - radius, 0.0))
@@ -244,21 +156,18 @@ def near_rays(beams: Beams, patches: Patches) -> NearRays:
     # The range is measured along the ray, from `begin` at least to the far end at the greatest depth at most: both
     # tests keep an arc if any of it may be within range.
     depth = np.maximum(np.abs(patches.bottom), np.abs(patches.top))[patch]
-    in_range = (begin <= beams.max_range[channel]) & (np.hypot(end, depth) >= beams.min_range[channel])
+    in_range = (begin <= model.max_range) & (np.hypot(end, depth) >= model.min_range)
     some = np.flatnonzero((begin <= end) & in_range)
     patch, channel = patch[some], channel[some]
+    zero = yaw + model.azimuth_offsets + model.first_azimuth
+    azimuth = patches.azimuth[patch] - zero[channel]
     arc, first, width = steps_in_arcs(
-        patches.azimuth[patch] - beams.zero[channel],
-        half_width[some],
-        beams.size[channel],
-        beams.steps[channel],
-        beams.all_round[channel],
+        azimuth, half_width[some], model.azimuth_step, model.azimuth_count, all_round=model.all_round
     )
-    miss = np.abs((begin + end)[some] / 2 - patches.distance[patch])
-    return NearRays(patches.target[patch[arc]], channel[arc], first, width, miss[arc])
+    return NearRays(patches.target[patch[arc]], channel[arc], first, width)
 
 
-def _channels_at(beams: Beams, patches: Patches) -> tuple[Integer, Integer]:
+def _channels_at(model: LidarModel, patches: Patches) -> tuple[Integer, Integer]:
     """Return pairs of patches and of channels that are at the patch's heights somewhere in the cylinder."""
     # The slopes from the sensor to the patch's edges, each at the side of the cylinder where it is most extreme.
     # Channels between these slopes are one slice of all channels sorted by elevation.
@@ -267,11 +176,11 @@ def _channels_at(beams: Beams, patches: Patches) -> tuple[Integer, Integer]:
     with np.errstate(divide="ignore"):
         least = patches.bottom / np.where(patches.bottom < 0, near, far)
         most = patches.top / np.where(patches.top > 0, near, far)
-    order = np.argsort(beams.elevation, kind="stable")
-    slopes = np.tan(beams.elevation[order])
+    order = np.argsort(model.elevations, kind="stable")
+    slopes = np.tan(model.elevations[order])
     low = np.searchsorted(slopes, least)
     count = np.searchsorted(slopes, most, side="right") - low
-    count = np.where((patches.bottom <= patches.top) & (near <= beams.max_range.max()), np.maximum(count, 0), 0)
+    count = np.where((patches.bottom <= patches.top) & (near <= model.max_range), np.maximum(count, 0), 0)
     return np.repeat(np.arange(len(count)), count), order[concatenated_ranges(low, count)]
 
 

@@ -29,7 +29,7 @@ from ..lidar.catalogue import find_models
 from ..lidar.model import LidarModel
 from .ray_casting import engine_name, make_ray_caster
 from .settings import Engine, VisibilitySettings
-from .visibility_model import VisibilityModel, sharing_rays
+from .visibility_model import VisibilityModel
 
 FILE = ArrayFile(
     "seip.visibility",
@@ -136,14 +136,13 @@ def visibility_key(site: Site, models: Mapping[str, LidarModel], settings: Visib
 
 
 def seen_from(
-    model: VisibilityModel, candidates: Candidates, models: Mapping[str, LidarModel], poses: Integer
+    model: VisibilityModel, candidates: Candidates, models: Mapping[str, LidarModel], pose: int
 ) -> tuple[Boolean, int]:
-    """Compute the targets that some candidate poses see which share rays; see `VisibilityModel.see_all`."""
-    first = int(poses[0])
-    types = [models[key] for key in candidates.sensor[poses].tolist()]
-    if candidates.tilt[first] == 0:
-        return model.see_upright(types, candidates.xyz[first], float(candidates.yaw[first]))
-    return model.see_all(types, candidates.xyz[first], candidates.orientation(first))
+    """Compute the targets that a candidate pose sees, and the number of rays; see `VisibilityModel.scan`."""
+    kind, xyz = models[str(candidates.sensor[pose])], candidates.xyz[pose]
+    if candidates.tilt[pose] == 0:
+        return model.scan_upright(kind, xyz, float(candidates.yaw[pose]))
+    return model.scan(kind, xyz, candidates.orientation(pose))
 
 
 def compute_visibility(
@@ -167,7 +166,7 @@ def compute_visibility(
     Yields
     ------
     Progress
-        Progress after each position.
+        Progress after each pose.
 
     Returns
     -------
@@ -184,16 +183,15 @@ def compute_visibility(
     name, candidates = engine_name(engine), site.candidates
     caster = make_ray_caster(site.triangles, name)
     model = VisibilityModel(site.targets.xyz, site.reflectivity, settings, caster)
-    groups = sharing_rays(candidates.xyz, candidates.yaw, candidates.tilt)
     packed = np.zeros((len(candidates), (len(site.targets) + 7) // 8), dtype=np.uint8)
-    rays = np.zeros(len(groups), dtype=np.int64)
+    rays = np.zeros(len(candidates), dtype=np.int64)
 
-    def compute(number: int) -> None:
-        seen, rays[number] = seen_from(model, candidates, used, groups[number])
-        packed[groups[number]] = np.packbits(seen, axis=1)
+    def compute(pose: int) -> None:
+        seen, rays[pose] = seen_from(model, candidates, used, pose)
+        packed[pose] = np.packbits(seen)
 
     yield from each_in_threads(
-        compute, range(len(groups)), min(caster.threads, threads or caster.threads), "visibility"
+        compute, range(len(candidates)), min(caster.threads, threads or caster.threads), "visibility"
     )
     origin = {"engine": name, "sensors": list(used), "rays_of_full_scan": _rays_of_full_scan(site, used)}
     parameters = {**asdict(settings), **origin, "rays_cast": int(rays.sum())}

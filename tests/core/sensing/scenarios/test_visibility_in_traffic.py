@@ -91,7 +91,7 @@ def views(instants, around=AROUND):
 def place_of(pose, caster, around, reflectivity):
     poses = SITE.candidates
     model = around.models[str(poses.sensor[pose])]
-    return ScanPosition(caster, poses.xyz[pose], float(poses.yaw[pose]), [model], around.sight, reflectivity)
+    return ScanPosition(caster, poses.xyz[pose], float(poses.yaw[pose]), model, around.sight, reflectivity)
 
 
 def by_full_scan(bodies, engine=ANY, around=AROUND):
@@ -99,7 +99,7 @@ def by_full_scan(bodies, engine=ANY, around=AROUND):
     caster = make_ray_caster(np.concatenate([SITE.triangles, bodies.triangles]), engine)
     reflectivity = np.concatenate([SITE.reflectivity, bodies.reflectivity])
     surfaces = near_surfaces(SITE.triangles, SITE.targets.xyz, around.sight.delta, SITE.reflectivity)
-    return np.concatenate(
+    return np.array(
         [
             seen_by_tilted_full_scan(place_of(pose, caster, around, reflectivity), tilt, surfaces)[0]
             for pose, tilt in enumerate(SITE.candidates.tilt.tolist())

@@ -58,7 +58,7 @@ def test_a_level_sensor_sees_what_its_candidate_sees():
     some = np.arange(0, len(poses), max(1, len(poses) // 6))
     looks = visibility_model(SITE, SIGHT, ANY)
     for pose in some:
-        row = seen_from(looks, poses, MODELS, np.array([pose]))[0][0]
+        row = seen_from(looks, poses, MODELS, pose)[0]
         model = MODELS[str(poses.sensor[pose])]
         seen = looks.see(model, poses.xyz[pose], level_orientation(float(poses.yaw[pose])))
         assert (seen == row).all()
