@@ -30,32 +30,6 @@ _MARGIN = 1e-9  # radians; one ray too many costs a cast, one too few makes the 
 
 
 @dataclass(frozen=True, eq=False)
-class Patches:
-    """Patches: regions in which returns near targets can lie, as seen from one position.
-
-    Parameters
-    ----------
-    target : (p,) int64
-        Target of each patch, ascending.
-    azimuth : (p,) float64, radians
-        Azimuth of the cylinder's axis, counter-clockwise from +x.
-    distance : (p,) float64, metres
-        Distance of the axis in plan.
-    radius : (p,) float64, metres
-        Radius of the cylinder.
-    bottom, top : (p,) float64, metres
-        Heights relative to the position; bottom > top where no return is possible.
-    """
-
-    target: Integer
-    azimuth: Float
-    distance: Float
-    radius: Float
-    bottom: Float
-    top: Float
-
-
-@dataclass(frozen=True, eq=False)
 class NearRays:
     """The rays that can return from near targets: bundles of neighbouring azimuth steps of a channel.
 
@@ -129,58 +103,61 @@ def may_return(origin: Float, surfaces: NearSurfaces, model: LidarModel, setting
     return may
 
 
-def target_patches(origin: Float, surfaces: NearSurfaces, selected: Boolean) -> Patches:
-    """Return the patches of selected targets (t,) bool as seen from a position."""
-    target = np.flatnonzero(selected)
-    x, y, _ = (surfaces.xyz[target] - origin).T
-    radius = np.full(len(target), surfaces.radius)
-    bottom, top = surfaces.low[target] - origin[2], surfaces.high[target] - origin[2]
-    return Patches(target, np.arctan2(y, x), np.hypot(x, y), radius, bottom, top)
+def near_rays(model: LidarModel, origin: Float, yaw: float, surfaces: NearSurfaces, selected: Boolean) -> NearRays:
+    """Find the rays of a sensor that can return from near selected targets, (t,) bool.
 
-
-def near_rays(model: LidarModel, yaw: float, patches: Patches) -> NearRays:
-    """Find the rays of a sensor of a given yaw, in radians, that can return from patches.
+    Parameters
+    ----------
+    origin : (3,) float64, metres
+        Position of the sensor.
+    yaw : float, radians
+        Direction of azimuth zero.
 
     Returns
     -------
     NearRays
         All rays that can return from a patch, and few that cannot.
     """
-    patch, channel = _channels_at(model, patches)
-    slope, distance, radius = np.tan(model.elevations)[channel], patches.distance[patch], patches.radius[patch]
-    begin, end = _between_heights(slope, patches.bottom[patch], patches.top[patch])
+    target = np.flatnonzero(selected & (surfaces.low <= surfaces.high))
+    x, y, _ = (surfaces.xyz[target] - origin).T
+    bottom, top = surfaces.low[target] - origin[2], surfaces.high[target] - origin[2]
+    patch_distance, radius = np.hypot(x, y), surfaces.radius
+    patch, channel = _channels_at(model, patch_distance, radius, bottom, top)
+    slope, distance = np.tan(model.elevations)[channel], patch_distance[patch]
+    begin, end = _between_heights(slope, bottom[patch], top[patch])
     # fmax and fmin ignore NaN, the value of level beams within the heights: for these only the cylinder limits r
     begin = np.fmax(begin, np.maximum(distance - radius, 0.0))
     end = np.fmin(end, distance + radius)
     half_width = _half_width(distance, begin, end, radius)
     # The range is measured along the ray, from `begin` at least to the far end at the greatest depth at most: both
     # tests keep an arc if any of it may be within range.
-    depth = np.maximum(np.abs(patches.bottom), np.abs(patches.top))[patch]
+    depth = np.maximum(np.abs(bottom), np.abs(top))[patch]
     in_range = (begin <= model.max_range) & (np.hypot(end, depth) >= model.min_range)
     some = np.flatnonzero((begin <= end) & in_range)
     patch, channel = patch[some], channel[some]
     zero = yaw + model.azimuth_offsets + model.first_azimuth
-    azimuth = patches.azimuth[patch] - zero[channel]
+    azimuth = np.arctan2(y, x)[patch] - zero[channel]
     arc, first, width = steps_in_arcs(
         azimuth, half_width[some], model.azimuth_step, model.azimuth_count, all_round=model.all_round
     )
-    return NearRays(patches.target[patch[arc]], channel[arc], first, width)
+    return NearRays(target[patch[arc]], channel[arc], first, width)
 
 
-def _channels_at(model: LidarModel, patches: Patches) -> tuple[Integer, Integer]:
+def _channels_at(
+    model: LidarModel, distance: Float, radius: float, bottom: Float, top: Float
+) -> tuple[Integer, Integer]:
     """Return pairs of patches and of channels that are at the patch's heights somewhere in the cylinder."""
     # The slopes from the sensor to the patch's edges, each at the side of the cylinder where it is most extreme.
     # Channels between these slopes are one slice of all channels sorted by elevation.
-    near = np.maximum(patches.distance - patches.radius, 0.0)
-    far = patches.distance + patches.radius
+    near, far = np.maximum(distance - radius, 0.0), distance + radius
     with np.errstate(divide="ignore"):
-        least = patches.bottom / np.where(patches.bottom < 0, near, far)
-        most = patches.top / np.where(patches.top > 0, near, far)
+        least = bottom / np.where(bottom < 0, near, far)
+        most = top / np.where(top > 0, near, far)
     order = np.argsort(model.elevations, kind="stable")
     slopes = np.tan(model.elevations[order])
     low = np.searchsorted(slopes, least)
     count = np.searchsorted(slopes, most, side="right") - low
-    count = np.where((patches.bottom <= patches.top) & (near <= model.max_range), np.maximum(count, 0), 0)
+    count = np.where(near <= model.max_range, np.maximum(count, 0), 0)
     return np.repeat(np.arange(len(count)), count), order[concatenated_ranges(low, count)]
 
 
@@ -192,7 +169,7 @@ def _between_heights(slope: Float, bottom: Float, top: Float) -> tuple[Float, Fl
     return np.where(slope < 0, at_top, at_bottom), np.where(slope < 0, at_bottom, at_top)
 
 
-def _half_width(distance: Float, begin: Float, end: Float, radius: Float) -> Float:
+def _half_width(distance: Float, begin: Float, end: Float, radius: float) -> Float:
     """Return half the arc of an annulus within a circle; π from within the circle."""
     # Seen from outside, a circle is widest at the tangent length √(L² - δ²). If the annulus does not contain that, the
     # arc is widest at the end of the annulus that is nearer to it.

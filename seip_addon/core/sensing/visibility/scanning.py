@@ -17,13 +17,12 @@ from ...base.arrays import Boolean, Float, Integer, concatenated_ranges
 from ...geometry.orientation import rotated
 from ..lidar.beams import BeamPattern
 from ..lidar.model import LidarModel
-from .beam_culling import NearRays, may_return, near_rays, target_patches
+from .beam_culling import NearRays, may_return, near_rays
 from .near_surfaces import NearSurfaces
 from .ray_casting import RayCaster
 from .settings import VisibilitySettings
 from .target_index import TargetIndex, is_within, squared_length
 
-_RAYS_AT_ONCE = 1 << 17  # bounds the memory of rays that are cast at once
 _PAIRS_AT_ONCE = 1 << 18  # of rays and surfaces: bounds the memory at borders of surfaces
 
 
@@ -178,7 +177,7 @@ def seen_by_near_rays(position: ScanPosition, surfaces: NearSurfaces) -> tuple[B
     """
     returns, seen = _Returns(position, surfaces), np.zeros(len(surfaces.xyz), dtype=bool)
     possible = may_return(position.origin, surfaces, position.model, position.settings)
-    bundles = near_rays(position.model, position.yaw, target_patches(position.origin, surfaces, possible))
+    bundles = near_rays(position.model, position.origin, position.yaw, surfaces, possible)
     # Each round splits bundles in halves, so that the rounds are few: the logarithm of the widest one. All middle rays
     # of a round are cast together, which the casters need to be fast. The loop ends when every ray of every bundle is
     # cast, or of no use since its target is seen. So nothing is missed.
@@ -186,24 +185,6 @@ def seen_by_near_rays(position: ScanPosition, surfaces: NearSurfaces) -> tuple[B
         seen[bundles.target[returns.see(bundles)]] = True
         bundles = bundles.beside_middle()
     return seen, returns.cast
-
-
-def seen_by_rays(position: ScanPosition, rays: Integer, surfaces: NearSurfaces, index: TargetIndex) -> Boolean:
-    """Return the targets that a sensor sees with the given rays, all of which are cast, (t,) bool.
-
-    Parameters
-    ----------
-    rays : (n,) int64
-        Numbers of the rays, as in `BeamPattern`.
-    index : TargetIndex
-        Index of the targets.
-    """
-    pattern = BeamPattern(position.model, position.yaw)
-    seen = np.zeros(len(surfaces.xyz), dtype=bool)
-    for begin in range(0, len(rays), _RAYS_AT_ONCE):
-        directions = pattern.directions(rays[begin : begin + _RAYS_AT_ONCE])
-        seen[position.pairs_seen(directions, *position.cast(directions), surfaces, index)[1]] = True
-    return seen
 
 
 class _Returns:
