@@ -57,7 +57,7 @@ def main(argv: list[str]) -> None:
         save_blend(folder / "verified.blend")
     for line in _lines(found):
         runtime.print_line(line)
-    written = "verified.blend, changes.png, changes.csv, returns.png, verification.json"
+    written = "verified.blend, changes.png, changes.csv, verification.json"
     runtime.print_line(f"written to {folder}/: {written}{f', {UNITS_FILE}' * (folder / UNITS_FILE).exists()}")
 
 

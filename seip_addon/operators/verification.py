@@ -12,7 +12,7 @@ import bpy
 from .. import preferences
 from ..core.base.errors import SeipError
 from ..core.base.progress import Progress
-from ..core.output.results.file_names import VERIFICATION_FOLDER, VERIFICATION_PICTURES
+from ..core.output.results.file_names import VERIFICATION_FOLDER, VERIFICATION_PICTURE
 from ..core.output.results.verification_record import summary
 from ..core.output.results.versions import versions
 from ..core.sensing.recordings.recording import Recording, open_recording
@@ -35,10 +35,10 @@ from .detection import folder_of_result
 from .results import no_folder
 from .traffic import no_sensors
 
-NO_RECORDING = "Name a recording of the installed sensors: a folder of sweeps, or a .pcap."
+NO_RECORDING = "Name a recording of the installed sensors: a folder of sweeps."
 NOT_VERIFIED = "Not verified since the file was opened: verify again to add the changes."
 CHANGED = "The scene has changed since: verify again."
-CHANGES = VERIFICATION_PICTURES[0]
+CHANGES = VERIFICATION_PICTURE
 
 
 def why_no_verification(scene: bpy.types.Scene) -> str:

@@ -133,7 +133,7 @@ def _between(interval: tuple[float, float] | None) -> str:
 def draw_verification(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     """Draw the recording, the button, and what the last verification found."""
     scene = context.scene
-    draw_path(layout, scene.seip.verification, "recording", "Recording (folder, .pcap)", named=False)
+    draw_path(layout, scene.seip.verification, "recording", "Recording (folder)", named=False)
     reason = why_no_verification(scene)
     draw_reason(layout, "" if reason == NO_RECORDING else reason)  # an empty field says so itself
     draw_run(layout, "seip.verify")

@@ -99,18 +99,6 @@ def gain_text(pose: InstalledSensor) -> str:
     return f"{says}: it detects the same surface up to about {reach:.0%} of the distance ({low:.0%} to {high:.0%})."
 
 
-def returns_sentence(pose: InstalledSensor) -> str:
-    """Return the range at which returns from the road differ most from the promise, or "" without any."""
-    road = [one for one in pose.returns if one.surface == "road"]
-    if not road:
-        return ""
-    most = max(road, key=lambda one: abs(one.measured - one.predicted))
-    return (
-        f"Of its beams that meet the road at {most.low:g} to {most.high:g} m, {most.measured:.0%} return; "
-        f"{most.predicted:.0%} were promised."
-    )
-
-
 def change_text(change: RecordedChange) -> str:
     """Return what a change is."""
     return {"new": "not in the plan", "gone": "no longer there", "vehicle": "standing vehicle"}[change.kind]

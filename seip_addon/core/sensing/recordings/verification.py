@@ -20,30 +20,6 @@ class Gain:
 
 
 @dataclass(frozen=True)
-class ReturnShare:
-    """Shares of the rays that return from one kind of surface in one range.
-
-    Parameters
-    ----------
-    surface : str
-        ``road``, ``ground`` or ``objects``.
-    low, high : float, metres
-        Range.
-    rays : int
-    predicted, fitted, measured : float, 0 to 1
-        By the model's law, by the law with the unit's gain, and in the recording.
-    """
-
-    surface: str
-    low: float
-    high: float
-    rays: int
-    predicted: float
-    fitted: float
-    measured: float
-
-
-@dataclass(frozen=True)
 class CoverageSteps:
     """Coverage of the same targets, 0 to 1, from the plan to the recording.
 
@@ -107,7 +83,6 @@ class InstalledSensor:
     match: float
     background: RecordedBackground
     gain: Gain | None
-    returns: tuple[ReturnShare, ...]
 
     @property
     def planned_m(self) -> tuple[float, ...]:
