@@ -28,7 +28,6 @@ from seip_addon.core.output.pictures.chart_style import MARKERS, colour, new_fig
 from seip_addon.core.output.pictures.palette import INK, SOFT_INK
 from seip_addon.core.programs.sumo_programs import NETWORK_SUFFIX
 from seip_addon.core.site.sources import source_lines
-from seip_addon.core.storage.files import locked_file
 from seip_addon.core.workflows.site_building import SiteRequest, build_site, save_map
 from seip_addon.core.world.elevation.at_place import TerrainRequest
 from seip_addon.core.world.elevation.obstacles import MAX_CHANGED, RAYS, Merging, chosen_merging
@@ -65,8 +64,7 @@ def main(argv: list[str]) -> None:
     """Read the source, model the site and save it."""
     request = _parser().parse_args(argv)
     check_name(request.output)
-    with locked_file(request.output):
-        _build(request)
+    _build(request)
 
 
 def _build(request: argparse.Namespace) -> None:

@@ -28,6 +28,7 @@ REMOVED: dict[str, str] = {
     "--position-error": _ERRORS,
     "--reflectivity": "set the property seip_reflectivity of the material in the scene",
     "--scenarios": _CONSTANT,
+    "--scheduler": "visibility takes seconds; `seip network --scheduler` shares many sites among machines",
     "--seen-by": "the result has the share of the road seen twice; --failures worst asks for redundancy",
     "--sensors-only": "give --installed-cost a TOML file whose costs are 0",
     "--setback": _CONSTANT,

@@ -8,24 +8,28 @@ import numpy as np
 
 from seip_addon.core.base.arrays import Boolean
 from seip_addon.core.geometry.orientation import orientation as orientation_of
+from seip_addon.core.sensing.lidar.beams import BeamPattern
 from seip_addon.core.sensing.visibility.near_surfaces import NearSurfaces, rotated_surfaces
-from seip_addon.core.sensing.visibility.scanning import ScanPosition, seen_by_rays
+from seip_addon.core.sensing.visibility.scanning import ScanPosition
 from seip_addon.core.sensing.visibility.target_index import TargetIndex
 from seip_addon.core.sensing.visibility.visibility_model import is_upright, yaw_of
 
+_RAYS_AT_ONCE = 1 << 17  # bounds the memory of rays that are cast at once
+
 
 def seen_by_all_rays(position: ScanPosition, surfaces: NearSurfaces) -> tuple[Boolean, int]:
-    """Find the targets that are seen by casting every ray of every sensor: the reference."""
-    index = TargetIndex(surfaces.xyz, position.settings.delta)
-    rays = [np.arange(model.channels * model.azimuth_count) for model in position.models]
-    seen = [
-        seen_by_rays(position, model, own, surfaces, index) for model, own in zip(position.models, rays, strict=True)
-    ]
-    return np.array(seen), sum(map(len, rays))
+    """Find the targets that are seen by casting every ray: the reference."""
+    pattern, index = BeamPattern(position.model, position.yaw), TargetIndex(surfaces.xyz, position.settings.delta)
+    rays = np.arange(position.model.channels * position.model.azimuth_count)
+    seen = np.zeros(len(surfaces.xyz), dtype=bool)
+    for begin in range(0, len(rays), _RAYS_AT_ONCE):
+        directions = pattern.directions(rays[begin : begin + _RAYS_AT_ONCE])
+        seen[position.pairs_seen(directions, *position.cast(directions), surfaces, index)[1]] = True
+    return seen, len(rays)
 
 
 def seen_by_tilted_full_scan(position: ScanPosition, tilt: float, surfaces: NearSurfaces) -> tuple[Boolean, int]:
-    """Find the targets that sensors tilted by an angle (radians) see, by casting every ray: the reference."""
+    """Find the targets that a sensor tilted by an angle (radians) sees, by casting every ray: the reference."""
     if tilt == 0:
         return seen_by_all_rays(position, surfaces)
     orientation = orientation_of(position.yaw, tilt)

@@ -20,7 +20,7 @@ from headless.studies.benchmark.resource_usage import in_fresh_process
 from headless.studies.benchmark.scans import scan_costs
 from headless.studies.benchmark.simplifications import SITE_SENSORS, degradations, simplifications
 from headless.studies.benchmark.street_visibility import street_problem
-from headless.studies.benchmark.visibility import sampled_positions, visibility_costs
+from headless.studies.benchmark.visibility import sampled_poses, visibility_costs
 
 import bpy
 
@@ -121,7 +121,7 @@ def measure(geometry: SceneGeometry, scope: BenchmarkScope) -> Findings:
         "targets": len(site.targets),
         "poses": len(site.candidates),
         "triangles": len(site.triangles),
-        "positions": len(sampled_positions(site, scope.positions)),
+        "positions": len(sampled_poses(site, scope.positions)),
         "sensor": scope.layout.sensors[0],
         "scanned_by": scope.scanned_by,
         "frames": scope.frames,

@@ -10,16 +10,15 @@ from typing import Any
 from headless.studies.benchmark.placement import ours
 from headless.studies.benchmark.resource_usage import Expense, in_fresh_process, peak_memory
 from headless.studies.benchmark.street_visibility import street_problem
-from headless.studies.benchmark.visibility import sampled_positions
+from headless.studies.benchmark.visibility import sampled_poses
 
 import numpy as np
 
 from seip_addon.core.base.arrays import Float
 from seip_addon.core.sensing.lidar.model import LidarModel
-from seip_addon.core.sensing.visibility.chunks import compute_rows
+from seip_addon.core.sensing.visibility.grid import seen_from
 from seip_addon.core.sensing.visibility.ray_casting import make_ray_caster
 from seip_addon.core.sensing.visibility.settings import VisibilitySettings
-from seip_addon.core.sensing.visibility.triangle_culling import needed_triangles
 from seip_addon.core.sensing.visibility.visibility_model import VisibilityModel
 from seip_addon.core.site.site import Site
 
@@ -72,7 +71,7 @@ def corridor_growth(
 ) -> Growth:
     """Measure visibility of corridors, which consist of copies of a site; samples are scaled up to all positions."""
     kilometres = float(np.ptp(site.triangles[:, :, 0])) / 1000
-    positions = len(sampled_positions(site, len(site.candidates)))
+    positions = len(sampled_poses(site, len(site.candidates)))
     costs = []
     for number in copies:
         scale = number * positions / samples
@@ -110,18 +109,15 @@ def visibility_cost(
     represents.
     """
     poses = site.candidates
-    longest = max(model.max_range for model in models.values())
     for_site, for_positions = Expense(), Expense()
 
     def make_model() -> VisibilityModel:
-        needed = needed_triangles(site.triangles, poses.xyz, site.targets.xyz, settings.delta, longest)
-        caster = make_ray_caster(site.triangles, keep=needed.keep)
-        return VisibilityModel(site.targets.xyz, site.reflectivity, settings, caster)
+        return VisibilityModel(site.targets.xyz, site.reflectivity, settings, make_ray_caster(site.triangles))
 
     def work() -> None:
         model = for_site.time(make_model)
-        for group in sampled_positions(site, samples):
-            for_positions.time(partial(compute_rows, model, poses, models, group))
+        for pose in sampled_poses(site, samples):
+            for_positions.time(partial(seen_from, model, poses, models, pose))
 
     _, memory = peak_memory(work)
     return for_site.cpu + for_positions.cpu * positions_per_sample, memory
