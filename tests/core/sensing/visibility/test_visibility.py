@@ -20,9 +20,12 @@ from seip_addon.core.sensing.lidar.catalogue import load_catalogue
 from seip_addon.core.sensing.lidar.model import LidarModel
 from seip_addon.core.sensing.lidar.range_equation import RangeEquation
 from seip_addon.core.sensing.visibility.grid import (
+    PART,
     VisibilityGrid,
     VisibilitySettings,
     compute_visibility,
+    seen_from,
+    stored_visibility,
     visibility_key,
 )
 from seip_addon.core.sensing.visibility.ray_casting import make_ray_caster
@@ -324,6 +327,51 @@ def test_the_road_is_seen_as_far_as_its_returns_are_detected() -> None:
 def test_settings_that_mean_nothing(values: tuple[float, ...]) -> None:
     with pytest.raises(SeipError):
         VisibilitySettings(*values)
+
+
+@needs_any
+def test_an_interrupted_run_goes_on_from_its_finished_rows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    site, models, settings = (
+        junction_site(positions=24, heights=[5.0], spacing=4.0),
+        load_catalogue(),
+        VisibilitySettings(),
+    )
+    stored = lambda name: stored_visibility(tmp_path / name, site, models, settings, ANY)  # noqa: E731
+    whole = finish(stored("whole.npz"))
+    steps = stored("grid.npz")
+    while next(steps).done == 0:
+        pass
+    steps.close()
+    part = tmp_path / "grid.part.npz"
+    assert sorted(path.name for path in tmp_path.iterdir()) == [part.name, "whole.npz"]
+    with PART.reading(part) as (_, arrays):
+        finished = arrays["poses"]
+    assert 0 < len(finished) < len(site.candidates)
+    cast = []
+    monkeypatch.setattr(
+        "seip_addon.core.sensing.visibility.grid.seen_from", lambda *args: cast.append(args[-1]) or seen_from(*args)
+    )
+    assert (finish(stored("grid.npz")).packed == whole.packed).all()
+    assert sorted([*cast, *finished.tolist()]) == list(range(len(site.candidates)))
+    assert (tmp_path / "grid.npz").read_bytes() == (tmp_path / "whole.npz").read_bytes()
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["grid.npz", "whole.npz"]
+
+
+@needs_any
+def test_rows_of_other_inputs_or_damaged_ones_are_computed_again(tmp_path: Path) -> None:
+    site, models = random_site(2), MODELS
+    other = replace(VisibilitySettings(), delta=0.5)
+    steps = stored_visibility(tmp_path / "grid.npz", site, models, other, ANY)
+    while next(steps).done == 0:
+        pass
+    steps.close()
+    assert (tmp_path / "grid.part.npz").exists()
+    grid = finish(stored_visibility(tmp_path / "grid.npz", site, models, VisibilitySettings(), ANY))
+    assert (grid.packed == grid_of(site, VisibilitySettings()).packed).all()
+    (tmp_path / "grid.npz").unlink()
+    (tmp_path / "grid.part.npz").write_bytes(b"damaged")
+    again = finish(stored_visibility(tmp_path / "grid.npz", site, models, VisibilitySettings(), ANY))
+    assert (again.packed == grid.packed).all()
 
 
 @needs_any
