@@ -24,7 +24,6 @@ from seip_addon.core.base.errors import SeipError
 from seip_addon.core.base.progress import finish
 from seip_addon.core.programs.sumo_programs import NETWORK_SUFFIX
 from seip_addon.core.site.sources import source_lines
-from seip_addon.core.storage.files import locked_file
 from seip_addon.core.workflows.site_building import SiteRequest, build_site, save_map
 from seip_addon.core.world.elevation.at_place import TerrainRequest
 from seip_addon.core.world.openstreetmap.map_links import parsed_position
@@ -37,8 +36,7 @@ def main(argv: list[str]) -> None:
     """Read the source, model the site and save it."""
     request = _parser().parse_args(argv)
     check_name(request.output)
-    with locked_file(request.output):
-        _build(request)
+    _build(request)
 
 
 def _build(request: argparse.Namespace) -> None:

@@ -31,13 +31,12 @@ from headless.detection.settings import BOTTOM, TOP
 from headless.detection.suitability import suitability_warnings
 from headless.detection.traffic_ground import apart, moved_ground
 from headless.detection.training import deterministic
-from headless.detection_results import print_precision, read_detections, save_charts, save_detections
+from headless.detection_results import print_precision, remove_detections, save_charts, save_detections
 from headless.options import real_number
 
 import bpy
 import numpy as np
 import shapely
-from PIL import Image
 from shapely.geometry.base import BaseGeometry
 
 from seip_addon.core.base.arrays import Boolean, Float
@@ -61,10 +60,7 @@ from seip_addon.core.sensing.visibility.ray_casting import make_ray_caster
 from seip_addon.core.site.scene_geometry import SceneGeometry, joined
 from seip_addon.core.storage.files import digest, natural_order, save_json, whole_file
 from seip_addon.core.storage.json_dataclass import as_json
-from seip_addon.core.storage.source_digest import source_digest
-from seip_addon.scene.interrupts import held_signals
 from seip_addon.scene.read import read_scene
-from seip_addon.scene.render import silenced
 from seip_addon.scene.sensors import read_sensors
 
 LEAST_CONFIDENCE = 0.5
@@ -104,7 +100,7 @@ def add_recording_options(parser: argparse.ArgumentParser) -> None:
         metavar="KEY",
         help="model of the sensors, or NAME=KEY for each; NAME is the folder of its sweeps",
     )
-    group.add_argument("--poses", type=Path, metavar="FILE", help="poses of the sensors: JSON, or KITTI's calibration")
+    group.add_argument("--poses", type=Path, metavar="FILE", help="poses of the sensors, as JSON")
     group.add_argument(
         "--site", type=Path, metavar="BLEND", help="scene with the sensors: their poses, the road and the map"
     )
@@ -124,12 +120,11 @@ def is_recording(source: Path | None) -> bool:
 
 
 def detect_recording(options: argparse.Namespace, detector: Detector) -> None:
-    """Detect road users in every frame of a recording, and write detections, pictures, video and figures."""
+    """Detect road users in every frame of a recording, and write detections, pictures and figures."""
     runtime.check_folder(options.output)
     sensors, recording = _opened(options)
     labels = _labels(options.labels, len(paired(recording)))
     confidence = Confidence.of_detector(options.detector, detector)
-    key = _key(options, recording, confidence)
     frames = runtime.finish_with_bar(
         prepare_frames(
             recording,
@@ -146,8 +141,10 @@ def detect_recording(options: argparse.Namespace, detector: Detector) -> None:
     for name, background in backgrounds:
         runtime.LOG.info(background.confidence(name))
     folder = options.output
-    _resume(folder, key)
-    with runtime.incomplete_if_interrupted(folder, continues=True):
+    remove_detections(folder)
+    for stale in (folder / "frames").glob("[0-9]*.png"):
+        stale.unlink()
+    with runtime.incomplete_if_interrupted(folder):
         results = runtime.finish_with_bar(_detected(options, frames, detector, area, labels, confidence))
     fullest = max(range(len(results)), key=lambda number: len(results[number].detected))
     scan = frames.frame(fullest)
@@ -158,16 +155,12 @@ def detect_recording(options: argparse.Namespace, detector: Detector) -> None:
             "the recording has no intensities: all points get the same one, and fewer road users may be found"
         )
     runtime.warn(doubts)
-    pictures = [folder / "frames" / f"{number:06d}.png" for number in range(len(frames))]
-    save_video(folder / "video.mp4", pictures, _rate(frames))
     confident = [confidence.applied(one) for one in results]
     beside = _apart(confident, sensors.geometry)
     listed = _save_table(folder / "detections.csv", confident, beside, sensors.geometry)
     outcome = _evaluated(results, fullest, scan) if labels is not None else None
     record: dict[str, Any] = {
         "schema": RECORDING_SCHEMA,
-        "key": key,
-        "complete": True,
         "recording": recording.name,
         "frames": len(frames),
         "sensors": [
@@ -206,7 +199,7 @@ def detect_recording(options: argparse.Namespace, detector: Detector) -> None:
     if record["apart"]:
         ground = "off the scene's road" if sensors.geometry else "standing where no vehicle was seen to move"
         runtime.print_line(f"{record['apart']:,} of them are vehicles {ground}, often false: column apart")
-    runtime.print_line(f"written to {folder}/: detections.csv, video.mp4, frames/, kitti/, openpcdet/")
+    runtime.print_line(f"written to {folder}/: detections.csv, frames/, kitti/, openpcdet/")
 
 
 def _detected(
@@ -217,7 +210,7 @@ def _detected(
     labels: Sequence[BoxLabels] | None,
     confidence: Confidence,
 ) -> Generator[Progress, None, list[FrameResult]]:
-    """Detect in each frame that an interrupted run has not done, write detections and picture, and return the results.
+    """Detect in each frame, write detections and picture, and return the results.
 
     Results have ground truth where the frames have labels.
     """
@@ -228,15 +221,12 @@ def _detected(
     for number in range(total):
         yield Progress(number, total, "detecting")
         frame = frames.frame(number, None if labels is None else labels[number])
-        found = _stored(options.output, number)
-        if found is None:
-            with deterministic(os.cpu_count() or 1):
-                found = _inside(detect(detector, area, frame), frames)
+        with deterministic(os.cpu_count() or 1):
+            found = _inside(detect(detector, area, frame), frames)
         run = f"part {number * blocks // total + 1}" if blocks > 1 else "recording"
         result = frame_result(frame, found, region=frames.region, sensors=places, run=run)
         path = options.output / "frames" / f"{number:06d}.png"
         _save_picture(path, frame, confidence.applied(result).detected, frames, area.site)
-        # last, as they mark the frame as done
         save_detections(options.output, number, found.boxes, result.detected.category.tolist(), found.score)
         results.append(result)
     yield Progress(total, total, "detecting")
@@ -323,7 +313,7 @@ def _labels(folder: Path | None, frames: int) -> list[BoxLabels] | None:
     """Read one file of labels for each frame, in the order of their names."""
     if folder is None:
         return None
-    named = (path for path in folder.glob("*") if path.suffix.lower() in {".txt", ".json"} and path.name != TIMES_FILE)
+    named = (path for path in folder.glob("*") if path.suffix.lower() == ".txt" and path.name != TIMES_FILE)
     files = sorted(named, key=natural_order)
     if len(files) != frames:
         raise SeipError(
@@ -343,37 +333,6 @@ def _require_vehicle(labels: Sequence[BoxLabels] | None, region: BaseGeometry, f
             f"no file of {folder} has a {' or '.join(MAIN_RULE.categories)} in the region: give labels in the axes of "
             "the site, or a larger --radius"
         )
-
-
-def _key(options: argparse.Namespace, recording: Recording, confidence: Confidence) -> str:
-    """Return a digest of all that the detections follow from."""
-    files = [path for record in recording.sensors for path in record.paths]
-    sources = [path for path in (options.poses, options.site, *options.catalogue) if path is not None]
-    return digest(
-        source_digest("headless"),
-        repr((confidence, options.sensor, options.radius)),
-        *(f"{path.name} {path.stat().st_size} {path.stat().st_mtime_ns}" for path in files),
-        *(path.read_bytes() for path in sources),
-    )
-
-
-def _resume(folder: Path, key: str) -> None:
-    """Keep the frames of an interrupted run of the same inputs; remove others."""
-    record = folder / RECORD
-    known = record.exists() and f'"{key}"' in record.read_text(encoding="utf-8")
-    if not known:
-        for part in ("kitti", "openpcdet", "frames"):
-            for stale in (folder / part).glob("[0-9]*.*"):
-                stale.unlink()
-        save_json(record, {"schema": RECORDING_SCHEMA, "key": key, "complete": False})
-
-
-def _stored(folder: Path, number: int) -> Detections | None:
-    """Return the detections of a frame that an interrupted run has written."""
-    path = folder / "openpcdet" / f"{number:06d}.txt"
-    if not path.exists() or not (folder / "frames" / f"{number:06d}.png").exists():
-        return None
-    return read_detections(path)
 
 
 def _save_picture(path: Path, frame: Frame, found: EvaluatedBoxes, frames: RecordedFrames, site: str) -> None:
@@ -440,47 +399,6 @@ def _save_table(
     with whole_file(path) as temporary:
         temporary.write_text(table.getvalue(), encoding="utf-8")
     return count
-
-
-def save_video(path: Path, pictures: Sequence[Path], rate: float) -> None:
-    """Write pictures of one size as an MP4 video (H.264).
-
-    Parameters
-    ----------
-    rate : float, hertz
-        Pictures per second.
-    """
-    scene = bpy.data.scenes.new("video")
-    try:
-        with Image.open(pictures[0]) as first:
-            render = scene.render
-            render.resolution_x, render.resolution_y = first.size
-        render.resolution_percentage = 100
-        render.fps, render.fps_base = max(1, round(rate)), max(1, round(rate)) / rate
-        scene.view_settings.view_transform = "Standard"  # pictures keep their colours
-        sequencer = scene.sequence_editor_create()
-        strips = sequencer.strips if hasattr(sequencer, "strips") else sequencer.sequences
-        strip = strips.new_image("pictures", str(pictures[0]), channel=1, frame_start=1)
-        for picture in pictures[1:]:
-            strip.elements.append(picture.name)
-        scene.frame_start, scene.frame_end = 1, len(pictures)
-        if hasattr(render.image_settings, "media_type"):  # Blender 5
-            render.image_settings.media_type = "VIDEO"
-        render.image_settings.file_format = "FFMPEG"
-        render.ffmpeg.format, render.ffmpeg.codec = "MPEG4", "H264"
-        render.ffmpeg.constant_rate_factor = "HIGH"
-        render.use_file_extension = False
-        with whole_file(path) as temporary, silenced(), held_signals():
-            render.filepath = str(temporary)
-            bpy.ops.render.render(animation=True, scene=scene.name)
-    finally:
-        bpy.data.scenes.remove(scene)
-
-
-def _rate(frames: RecordedFrames) -> float:
-    """Return the usual rate of frames, hertz."""
-    times = np.array([frames.time(number) for number in range(len(frames))])
-    return float(min(max(1.0 / max(np.median(np.diff(times)), 1e-3), 0.5), 30.0)) if len(times) > 1 else 1.0
 
 
 def _listed(results: Sequence[FrameResult]) -> dict[str, float | int | None]:

@@ -114,19 +114,12 @@ def check_folder(folder: Path) -> None:
 
 
 @contextmanager
-def incomplete_if_interrupted(folder: Path, *, continues: bool = False) -> Iterator[None]:
-    """Add to a Ctrl-C within the block that the folder is incomplete: its files are whole, but some are missing.
-
-    Parameters
-    ----------
-    continues : bool
-        Whether the same command continues from these files.
-    """
+def incomplete_if_interrupted(folder: Path) -> Iterator[None]:
+    """Add to a Ctrl-C within the block that the folder is incomplete: its files are whole, but some are missing."""
     try:
         yield
     except KeyboardInterrupt as stop:
-        cure = "; the same command continues from there" if continues else ""
-        raise KeyboardInterrupt(f"stopped while writing: the results in {folder} are incomplete{cure}") from stop
+        raise KeyboardInterrupt(f"stopped while writing: the results in {folder} are incomplete") from stop
 
 
 def print_line(text: str) -> None:

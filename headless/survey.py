@@ -24,7 +24,6 @@ from seip_addon.core.choosing.placement.deployment import Sensor
 from seip_addon.core.choosing.placement.objective import Objective, Solution
 from seip_addon.core.output.results.placement_record import Provenance
 from seip_addon.core.output.results.versions import versions
-from seip_addon.core.sensing.visibility.triangle_culling import culling_message
 from seip_addon.core.sensing.weather import weather_of
 from seip_addon.core.site.candidates import CandidateSettings
 from seip_addon.core.site.installed_cost import DEFAULTS, load_installed_cost
@@ -67,11 +66,6 @@ def add_options(parser: argparse.ArgumentParser) -> tuple[argparse._ArgumentGrou
     parser.add_argument("-o", "--output", type=Path, required=True, help="folder for the results")
     groups = add_survey_settings(parser)
     work = parser.add_argument_group("work")
-    work.add_argument(
-        "--scheduler",
-        metavar="ADDRESS",
-        help="Dask scheduler for ray casting: tcp://host:8786 or tls://host:8786",
-    )
     add_settings(work, SurveySettings, "solver", "effort")
     return (*groups, work)
 
@@ -150,8 +144,7 @@ def survey(
         early = watch.run("early answer", early_answer(layout, objective, file))
         if early.best:
             LOG.info("early answer from a few poses: %s", early.best)
-    surveyed = watch.run("visibility", see(layout, file, options.scheduler))
-    LOG.info(culling_message(surveyed.grid.parameters["triangles"]))
+    surveyed = watch.run("visibility", see(layout, file))
     return surveyed, watch
 
 

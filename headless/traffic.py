@@ -27,7 +27,6 @@ from seip_addon.core.sensing.traffic.floating_car_data import listed
 from seip_addon.core.sensing.traffic.source import TrafficFiles, describe_categories, load_traffic
 from seip_addon.core.sensing.traffic.trajectories import Trajectories
 from seip_addon.core.site.scene_geometry import SceneGeometry
-from seip_addon.core.storage.files import locked_file
 from seip_addon.core.workflows.traffic_simulation import SimulationSettings
 from seip_addon.core.world.traffic_simulation.demand import Demand
 from seip_addon.scene.blend_file import check_name, save_blend
@@ -43,8 +42,7 @@ def main(argv: list[str]) -> None:
     options = _options(argv)
     if options.animate is not None:
         check_name(options.animate)
-    with locked_file(options.output):
-        _make(options)
+    _make(options)
 
 
 def _options(argv: list[str]) -> argparse.Namespace:
@@ -112,7 +110,7 @@ def _parser() -> argparse.ArgumentParser:
         help=f"duration of the trajectories (of FCD all; simulated {SimulationSettings.duration:g})",
     )
     source = parser.add_mutually_exclusive_group(required=True)
-    source.add_argument("--fcd", type=Path, metavar="FILE", help="SUMO's floating car data: .xml or .csv, also as .gz")
+    source.add_argument("--fcd", type=Path, metavar="FILE", help="SUMO's floating car data: .xml, also as .gz")
     source.add_argument(
         "--simulate", type=Path, metavar="MAP", help="map or network of the scene, on which SUMO simulates traffic"
     )

@@ -57,7 +57,7 @@ def main(argv: list[str]) -> None:
         save_blend(folder / "verified.blend")
     for line in _lines(found):
         runtime.print_line(line)
-    written = "verified.blend, changes.png, changes.csv, returns.png, verification.json"
+    written = "verified.blend, changes.png, changes.csv, verification.json"
     runtime.print_line(f"written to {folder}/: {written}{f', {UNITS_FILE}' * (folder / UNITS_FILE).exists()}")
 
 
@@ -101,7 +101,7 @@ def _cost(cost: float) -> str:
 def _parser() -> argparse.ArgumentParser:
     parser = new_parser("verify", "Compare installed sensors with their plan, by a recording.")
     parser.add_argument("scene", type=Path, help="the .blend of the plan, with its sensors")
-    parser.add_argument("recording", type=Path, help="folder of sweeps, one for each sensor, or a .pcap")
+    parser.add_argument("recording", type=Path, help="folder of sweeps, or of a folder for each sensor")
     parser.add_argument("-o", "--output", type=Path, required=True, help="folder for the results")
     add_settings(parser, SurveySettings, "catalogue", "grid_spacing")
     add_weather(parser)

@@ -205,24 +205,21 @@ def _read_catalogue(path: Path, _: bytes) -> None:
 
 
 def _floating_car_data(_: Path) -> list[bytes]:
-    from tests.builders.sumo_text import CONVERTED_CSV, FCD, NATIVE_CSV  # noqa: PLC0415
+    from tests.builders.sumo_text import FCD  # noqa: PLC0415
 
-    return [text.encode() for text in (FCD, NATIVE_CSV, CONVERTED_CSV)] + [gzip.compress(FCD.encode(), mtime=0)]
+    return [FCD.encode(), gzip.compress(FCD.encode(), mtime=0)]
 
 
 def _mutate_floating_car_data(random: Random, content: bytes) -> bytes:
     return mutated_bytes(random, content) if content.startswith(b"\x1f") else mutated_text(random, content)
 
 
-def _read_floating_car_data(path: Path, content: bytes) -> None:
+def _read_floating_car_data(path: Path, _: bytes) -> None:
     from seip_addon.core.base.progress import finish  # noqa: PLC0415
     from seip_addon.core.sensing.traffic.floating_car_data import read_floating_car_data, read_trajectories  # noqa: PLC0415
     from seip_addon.core.sensing.traffic.trajectories import Trajectories  # noqa: PLC0415
     from seip_addon.core.sensing.traffic.vehicle_types import BUILT_IN  # noqa: PLC0415
 
-    table = path.with_suffix(".csv")  # which form it is goes by the name
-    if not content.lstrip().startswith((b"<", b"\x1f")):
-        path = path.rename(table)
     data = finish(read_floating_car_data(path))
     got, _ = read_trajectories(data, BUILT_IN, np.zeros(3), "fuzz")
     ground = replace(got, position=np.where(np.isnan(got.position), 0.0, got.position))
@@ -427,7 +424,7 @@ def _sweeps(suffix: str) -> Callable[[Path], list[bytes]]:
 
         columns = make_points(count=60)
         if suffix == ".pcd":
-            return [pcd_text(columns, data, "1 2 3 0 0 0 1") for data in ("ascii", "binary", "binary_compressed")]
+            return [pcd_text(columns, data, "1 2 3 0 0 0 1") for data in ("ascii", "binary")]
         return [write_sweep_file(folder / f"sample{suffix}", columns).read_bytes()]
 
     return samples
@@ -481,13 +478,8 @@ def _read_sweep(path: Path, _: bytes) -> None:
 
 
 def _sensor_poses(_: Path) -> list[bytes]:
-    from seip_addon.core.output.datasets.formats import CALIBRATION  # noqa: PLC0415
-
     rows = [[0.0, -1.0, 0.0, 12.5], [1.0, 0.0, 0.0, -3.25], [0.0, 0.0, 1.0, 6.0], [0.0, 0.0, 0.0, 1.0]]
-    turned = {"rotation": [row[:3] for row in rows[:3]], "translation": [row[3:] for row in rows[:3]]}
-    listed = {"sensors": [{"id": "S1", "pose": rows}, {"name": "S2", "pose": rows}]}
-    block = "".join(f"S{number}:\n" + "".join(f"- {row}\n" for row in rows) for number in (1, 2))
-    return [*(json.dumps(one).encode() for one in ({"S1": rows}, turned, listed)), block.encode(), CALIBRATION.encode()]
+    return [json.dumps(one).encode() for one in ({"S1": rows}, {"S1": rows, "S2": rows})]
 
 
 def _read_poses(path: Path, _: bytes) -> None:
@@ -502,15 +494,12 @@ def _read_poses(path: Path, _: bytes) -> None:
 
 def _box_labels(_: Path) -> list[bytes]:
     from seip_addon.core.output.datasets.formats import kitti_results, openpcdet_results  # noqa: PLC0415
-    from tests.builders.recording_files import dair_text, openlabel_text  # noqa: PLC0415
 
     kinds = ["car", "bus", "pedestrian"]
     boxes = np.array(
         [[10.0, -5.0, 0.8, 4.5, 1.8, 1.6, 0.3], [30, 4, 1.5, 12, 2.5, 3, -2], [7, 7, 0.9, 0.6, 0.7, 1.8, 1]]
     )
-    text = (openlabel_text(boxes.tolist(), kinds), dair_text(boxes.tolist(), kinds))
-    lines = [results(boxes, kinds, np.ones(3)) for results in (kitti_results, openpcdet_results)]
-    return [one.encode() for one in (*text, *lines)]
+    return [results(boxes, kinds, np.ones(3)).encode() for results in (kitti_results, openpcdet_results)]
 
 
 def _read_box_labels(path: Path, _: bytes) -> None:
@@ -534,10 +523,9 @@ FORMATS = {
     },
     "sweep.pcd": Format(".pcd", _sweeps(".pcd"), _mutate_pcd, _read_sweep),
     "sweep.bin": Format(".bin", _sweeps(".bin"), _mutate_numbers, _read_sweep),
-    "sweep.pcd.bin": Format(".pcd.bin", _sweeps(".pcd.bin"), _mutate_numbers, _read_sweep),
     "sweep.npz": Format(".npz", _sweeps(".npz"), _mutate_npz, _read_sweep),
     "poses": Format(".json", _sensor_poses, mutated_text, _read_poses),
-    "boxes": Format(".json", _box_labels, mutated_text, _read_box_labels),
+    "boxes": Format(".txt", _box_labels, mutated_text, _read_box_labels),
     "blend": Format(".blend", _blends, _mutate_blend, _read_blend),
 }
 

@@ -21,8 +21,7 @@ from seip_addon.core.sensing.scans.sensor import MountedSensor
 from seip_addon.core.sensing.scans.simulation import ScanSettings, Simulation, prepare
 from seip_addon.core.sensing.scans.static_scene import static_scene
 from seip_addon.core.sensing.traffic.bodies import fitted_body
-from seip_addon.core.sensing.traffic.parked import parked_users
-from seip_addon.core.sensing.traffic.trajectories import WARM_UP, Trajectories
+from seip_addon.core.sensing.traffic.trajectories import WARM_UP, Trajectories, parked_users
 from seip_addon.core.site.scene_geometry import SceneGeometry
 from seip_addon.core.storage.files import digest
 

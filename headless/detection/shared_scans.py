@@ -97,7 +97,7 @@ class SharedScans:
 
     def _simulation(self, run: SampledRun, poses: Sequence[int]) -> Simulation:
         simulator = self.simulator
-        scanners = [self._scanners[pose].for_other_traffic() for pose in poses]
+        scanners = [self._scanners[pose] for pose in poses]
         shapes = body_surfaces(_bodies(run), simulator.settings.engine)
         return Simulation(simulator.static, scanners, run.trajectories, shapes, simulator.settings)
 

@@ -194,7 +194,7 @@ def _cells(model: LidarModel) -> tuple[str, ...]:
     law = "calibrated" if model.calibration else "data sheet"
     return (
         title(model),
-        "rosette" if model.rosette is not None else f"{model.channels}",
+        f"{model.channels}",
         f"{math.degrees(model.field_of_view):.0f}° × {high - low:.0f}°",
         f"{upright_range(model, PANELS['pedestrian'].reflected, VisibilitySettings()):.0f} m",
         f"${model.price:,.0f}",
@@ -251,8 +251,7 @@ def _beams(
 ) -> tuple[tuple[Layer, ...], Block]:
     """Return the beams of a sensor.
 
-    Up to the radius in the legend all rings before the sensor are within 2δ of each other; of a rosette, all road in
-    view has a ray of the frame within δ.
+    Up to the radius in the legend all rings before the sensor are within 2δ of each other.
     """
     placed = np.array(matrix).reshape(4, 4)
     axes = placed[:3, :3] / np.maximum(np.linalg.norm(placed[:3, :3], axis=0), 1e-9)
@@ -260,17 +259,15 @@ def _beams(
     tilt = tilt if abs(tilt) > UPRIGHT else 0.0  # single precision cannot tell it from 0
     across = math.sqrt(max(model.max_range**2 - height**2, 0.0))
     resolved = unresolved_from(model, height, delta, across, tilt)
-    lines = beam_rings(model, placed[:3, 3], axes, float(placed[2, 3]) - height + LIFT, 2 * delta, resolved)
+    lines = beam_rings(model, placed[:3, 3], axes, float(placed[2, 3]) - height + LIFT, 2 * delta)
     pieces = ((lines.cone, CONE), (lines.rings[lines.wide], WIDE), (lines.rings[~lines.wide], DENSE))
-    rosette = model.rosette is not None
-    dense = f"at most {delta if rosette else 2 * delta:.3g} m to {'a ray' if rosette else 'the next ring inwards'}"
     where = f"{'in front ' if tilt else ''}up to {resolved:.0f} m"
     return tuple(
         Layer("LINES", piece.reshape(-1, 3).astype(np.float32), colour, WIDTH) for piece, colour in pieces if len(piece)
     ), Block(
         f"{model.name} at {height:.3g} m: no gaps on a level road {where}",
         (
-            Entry(dense, (DENSE,)),
+            Entry(f"at most {2 * delta:.3g} m to the next ring inwards", (DENSE,)),
             Entry("more: road between may go unseen", (WIDE,)),
             Entry("edge of the field of view", (CONE,)),
         ),

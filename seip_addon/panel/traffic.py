@@ -49,7 +49,7 @@ class SEIP_PG_traffic(bpy.types.PropertyGroup):
 
     file: path_property(
         "Traffic",
-        "Trajectories (.npz) or floating car data of SUMO (.xml, .csv, packed or not); "
+        "Trajectories (.npz) or floating car data of SUMO (.xml, packed or not); "
         f"{EXAMPLE} for the traffic of the example; empty for objects that are animated in the scene",
     )
     routes: path_property("Routes", "SUMO file with the vehicle types and their sizes")

@@ -12,7 +12,7 @@ from bpy.props import StringProperty
 
 from ..core.base.errors import SeipError
 from ..core.base.progress import Progress
-from ..core.output.results.file_names import VERIFICATION_FOLDER, VERIFICATION_PICTURES
+from ..core.output.results.file_names import VERIFICATION_FOLDER, VERIFICATION_PICTURE
 from ..core.output.results.verification_record import summary
 from ..core.output.results.versions import versions
 from ..core.sensing.recordings.recording import Recording, open_recording
@@ -35,10 +35,10 @@ from .scene_status import no_folder, no_sensors
 from .session import session
 from .work import Job, LongWork, ShortWork
 
-NO_RECORDING = "Name a recording of the installed sensors: a folder of sweeps, or a .pcap."
+NO_RECORDING = "Name a recording of the installed sensors: a folder of sweeps."
 NOT_VERIFIED = "Not verified since the file was opened: verify again to add the changes."
 CHANGED = "The scene has changed since: verify again."
-CHANGES = VERIFICATION_PICTURES[0]
+CHANGES = VERIFICATION_PICTURE
 
 
 class SEIP_PG_verification(bpy.types.PropertyGroup):
@@ -46,7 +46,7 @@ class SEIP_PG_verification(bpy.types.PropertyGroup):
 
     recording: path_property(
         "Recording",
-        "Folder with a folder of sweeps for each sensor, named after it, or a .pcap of an Ouster sensor. "
+        "Folder with a folder of sweeps for each sensor, named after it. "
         "To choose a folder, open it and press Accept with no file chosen",
     )
     found: StringProperty(
@@ -163,7 +163,7 @@ def status(scene: bpy.types.Scene) -> Status:
 def draw(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     """Draw the recording, the button, and what the last verification found."""
     scene = context.scene
-    draw_path(layout, scene.seip.verification, "recording", "Recording (folder, .pcap)", named=False)
+    draw_path(layout, scene.seip.verification, "recording", "Recording (folder)", named=False)
     reason = why_no_verification(scene)
     draw_reason(layout, "" if reason == NO_RECORDING else reason)  # an empty field says so itself
     draw_run(layout, "seip.verify")

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import importlib
 import math
-import os
-import sys
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -173,20 +171,6 @@ def _stage(scene: bpy.types.Scene) -> Iterator[bpy.types.Scene]:
         world = [stage.world] if stage.world else []
         bpy.data.scenes.remove(stage)
         bpy.data.batch_remove([*own, *(obj.data for obj in own), *world, *(set(bpy.data.images) - images)])
-
-
-@contextmanager
-def silenced() -> Iterator[None]:
-    """Keep Blender's lines about each step of a render from standard output, where results are printed."""
-    sys.stdout.flush()
-    kept = os.dup(1)
-    try:
-        with Path(os.devnull).open("w", encoding="utf-8") as nowhere:
-            os.dup2(nowhere.fileno(), 1)
-        yield
-    finally:
-        os.dup2(kept, 1)
-        os.close(kept)
 
 
 def _rendered_objects(scene: bpy.types.Scene) -> list[bpy.types.Object]:

@@ -163,9 +163,8 @@ def test_a_saved_placement_goes_on_without_computing(junction, tmp_path, monkeyp
     scene = bpy.context.scene
     assert session.of(scene).state is None
     assert scene.seip.result.record == before
-    for forbidden in ("compute_visibility", "optimise"):
-        monkeypatch.setattr(f"seip_addon.core.sensing.visibility.store.{forbidden}", None, raising=False)
-        monkeypatch.setattr(f"seip_addon.core.workflows.survey.{forbidden}", None, raising=False)
+    for forbidden in ("sensing.visibility.grid.compute_visibility", "workflows.placing.optimise"):
+        monkeypatch.setattr(f"seip_addon.core.{forbidden}", None)
     scene.seip.result.folder = "//out/"
     assert bpy.ops.seip.export_result() == {"FINISHED"}
     assert comparable(load_placement(tmp_path / "out" / "placement.json")) == comparable(parsed_record(before))

@@ -100,7 +100,7 @@ def names(scene):
 
 def test_the_panel_tells_poses_changes_and_coverage(verified, tmp_path):
     folder = tmp_path / "out" / "verification"
-    written = {"changes.csv", "changes.png", "returns.png", "units.toml", "verification.json"}
+    written = {"changes.csv", "changes.png", "units.toml", "verification.json"}
     assert {path.name for path in folder.iterdir()} == written
     record = load_verification(folder / "verification.json")
     for pose in record.sensors:

@@ -12,8 +12,7 @@ from seip_addon.core.sensing.scans.sensor import MountedSensor
 from seip_addon.core.sensing.scans.simulation import ScanSettings, prepare
 from seip_addon.core.sensing.scans.static_scene import static_scene
 from seip_addon.core.sensing.traffic.bodies import fitted_body
-from seip_addon.core.sensing.traffic.parked import parked_users
-from seip_addon.core.sensing.traffic.trajectories import Trajectories
+from seip_addon.core.sensing.traffic.trajectories import Trajectories, parked_users
 from seip_addon.core.sensing.visibility.ray_casting import make_ray_caster
 from seip_addon.scene.blend_file import open_blend
 from seip_addon.scene.read import read_scene

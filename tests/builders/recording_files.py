@@ -1,8 +1,5 @@
 """Files of real sensors, written by hand: sweeps, poses and labels."""
 
-import json
-import struct
-
 import numpy as np
 
 PCD_TYPES = {"f": "F", "i": "I", "u": "U"}
@@ -21,8 +18,6 @@ def make_points(seed=0, count=200):
 
 def pcd_text(columns, data="binary", viewpoint="0 0 0 1 0 0 0", **changes):
     """Return a PCD file of columns (n,) or (n, several), by PCL's description of the format."""
-    import lzf  # noqa: PLC0415  # a test's own library
-
     count = len(next(iter(columns.values())))
     parts = [np.asarray(column).reshape(count, *(column.shape[1:] or (1,))) for column in columns.values()]
     head = {
@@ -41,12 +36,8 @@ def pcd_text(columns, data="binary", viewpoint="0 0 0 1 0 0 0", **changes):
         body = "".join(
             " ".join(repr(value.item()) for part in parts for value in part[row]) + "\n" for row in range(count)
         ).encode()
-    elif data == "binary":
-        body = b"".join(part[row].tobytes() for row in range(count) for part in parts)
     else:
-        whole = b"".join(part.tobytes() for part in parts)
-        packed = lzf.compress(whole, 2 * len(whole) + 100) if whole else b""
-        body = struct.pack("<II", len(packed), len(whole)) + packed
+        body = b"".join(part[row].tobytes() for row in range(count) for part in parts)
     return (
         "# .PCD v0.7\n" + "".join(f"{key} {value}\n" for key, value in head.items() if value is not None)
     ).encode() + body
@@ -56,39 +47,10 @@ def write_sweep_file(path, columns):
     """Write x, y, z, intensity and ring in the format of a path's suffix, as far as it holds them."""
     table = np.column_stack([column.astype("<f4") for column in columns.values()])
     name = path.name
-    if name.endswith(".pcd.bin"):
-        path.write_bytes(table.tobytes())
-    elif name.endswith(".bin"):
+    if name.endswith(".bin"):
         path.write_bytes(np.ascontiguousarray(table[:, :4]).tobytes())
     elif name.endswith(".pcd"):
         path.write_bytes(pcd_text(columns))
     else:
         np.savez_compressed(path, **columns)
     return path
-
-
-def openlabel_text(boxes, kinds, frames=1):
-    """Return labels as TUMTraf has them; ``boxes`` are x, y, z, length, width, height, yaw."""
-    objects = {}
-    for number, ((x, y, z, length, width, height, yaw), kind) in enumerate(zip(boxes, kinds, strict=True)):
-        turn = [0.0, 0.0, np.sin(yaw / 2), np.cos(yaw / 2)]
-        cuboid = {"name": "shape3D", "val": [x, y, z, *turn, length, width, height], "attributes": {}}
-        objects[f"id-{number}"] = {"object_data": {"name": f"{kind}_{number}", "type": kind, "cuboid": cuboid}}
-    content = {"metadata": {"schema_version": "1.0.0"}, "coordinate_systems": {"s110_lidar_ouster_south": {}}}
-    content["frames"] = {str(frame): {"objects": objects, "frame_properties": {}} for frame in range(frames)}
-    return json.dumps({"openlabel": content})
-
-
-def dair_text(boxes, kinds):
-    """Return labels as DAIR-V2X has them, whose numbers are texts."""
-    return json.dumps(
-        [
-            {
-                "type": kind,
-                "3d_dimensions": {"h": repr(height), "w": repr(width), "l": repr(length)},
-                "3d_location": {"x": repr(x), "y": repr(y), "z": repr(z)},
-                "rotation": repr(yaw),
-            }
-            for (x, y, z, length, width, height, yaw), kind in zip(boxes, kinds, strict=True)
-        ]
-    )

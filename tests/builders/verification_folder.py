@@ -6,15 +6,19 @@ from pathlib import Path
 
 from PIL import Image
 
-from seip_addon.core.output.results.file_names import VERIFICATION_FILE, VERIFICATION_FOLDER, VERIFICATION_PICTURES
+from seip_addon.core.output.results.file_names import VERIFICATION_FILE, VERIFICATION_FOLDER, VERIFICATION_PICTURE
 from seip_addon.core.output.results.placement_record import load_placement
 from seip_addon.core.output.results.verification_record import (
     SCHEMA,
     RecordedChange,
     VerificationRecord,
 )
-from seip_addon.core.sensing.recordings.figures import CoverageSteps, Gain, ReturnShare
-from seip_addon.core.sensing.recordings.verification import InstalledSensor, RecordedBackground
+from seip_addon.core.sensing.recordings.verification import (
+    CoverageSteps,
+    Gain,
+    InstalledSensor,
+    RecordedBackground,
+)
 from seip_addon.core.storage.files import save_json
 from seip_addon.core.storage.json_dataclass import as_json
 
@@ -49,11 +53,6 @@ def make_pose(
         match=0.9,
         background=RecordedBackground(30, 60.0, 0.05),
         gain=gain,
-        returns=(
-            ReturnShare("road", 10.0, 20.0, 900, 0.9, 0.85, 0.86),
-            ReturnShare("road", 20.0, 30.0, 700, 0.8, 0.5, 0.45),
-            ReturnShare("objects", 20.0, 30.0, 700, 0.9, 0.1, 0.1),
-        ),
     )
 
 
@@ -65,6 +64,5 @@ def make_verification(folder: Path, without: int = 0) -> VerificationRecord:
     own = folder / VERIFICATION_FOLDER
     own.mkdir()
     save_json(own / VERIFICATION_FILE, {"schema": SCHEMA, **as_json(record)})
-    for name in VERIFICATION_PICTURES:
-        Image.new("RGB", (30, 20), (200, 30, 40)).save(own / name)
+    Image.new("RGB", (30, 20), (200, 30, 40)).save(own / VERIFICATION_PICTURE)
     return record

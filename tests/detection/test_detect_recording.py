@@ -73,21 +73,13 @@ def results(folder, tmp_path_factory):
     return output
 
 
-def files(output):
-    """Return the bytes of all results but the video, whose encoder stores the time, and the record's."""
-    paths = [path for part in ("kitti", "openpcdet", "frames") for path in sorted((output / part).iterdir())]
-    return {path.relative_to(output): path.read_bytes() for path in [*paths, output / "detections.csv"]}
-
-
-def test_detections_pictures_video_and_figures_are_written(results):
+def test_detections_pictures_and_figures_are_written(results):
     for part, suffix in (("kitti", "txt"), ("openpcdet", "txt"), ("frames", "png")):
         names = [f"{number:06d}.{suffix}" for number in range(SWEEPS)]
         assert sorted(path.name for path in (results / part).iterdir()) == names
     with Image.open(results / "frames" / "000000.png") as picture:
         assert picture.size == (1080, 1080)
-    assert b"ftyp" in (results / "video.mp4").read_bytes()[:12]
     record = json.loads((results / "detection.json").read_text(encoding="utf-8"))
-    assert record["complete"] is True
     assert record["frames"] == SWEEPS
     (sensor,) = record["sensors"]
     assert (sensor["id"], sensor["sensor"]) == ("S1", "os1_32_rev7")
@@ -174,32 +166,6 @@ def test_labels_give_average_precision(results):
     assert 0 <= listed["false_per_frame"] * SWEEPS <= len(rows) - hits
     for chart in ("where.png", "errors.png", "precision_recall.png"):
         assert (results / chart).read_bytes().startswith(b"\x89PNG")
-
-
-def test_an_interrupted_run_goes_on_and_gives_the_same_bytes(folder, results, tmp_path, monkeypatch):
-    save, detected = detect_recording._save_picture, []  # noqa: SLF001  # where a run may stop
-
-    def stop(path, *others):
-        if path.stem == "000003":
-            raise KeyboardInterrupt
-        save(path, *others)
-
-    run = detect_recording.detect
-    monkeypatch.setattr(detect_recording, "detect", lambda *given: detected.append(given) or run(*given))
-    monkeypatch.setattr(detect_recording, "_save_picture", stop)
-    named = arguments(folder, tmp_path / "out", "--labels", str(folder / "labels"))
-    with pytest.raises(KeyboardInterrupt, match="are incomplete; the same command continues from there"):
-        detect.main(named)
-    assert len(detected) == 4
-    assert json.loads((tmp_path / "out" / "detection.json").read_text(encoding="utf-8"))["complete"] is False
-    monkeypatch.setattr(detect_recording, "_save_picture", save)
-    detect.main(named)
-    assert len(detected) == 4 + SWEEPS - 3
-    assert files(tmp_path / "out") == files(results)
-    ours, theirs = (
-        json.loads((where / "detection.json").read_text(encoding="utf-8")) for where in (tmp_path / "out", results)
-    )
-    assert ours == theirs
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,6 @@ import bpy
 import pytest
 
 from seip_addon.core.base.errors import SeipError
-from seip_addon.core.storage.files import locked_file
 from seip_addon.scene import contract
 
 MAP = """<?xml version="1.0"?><OpenDRIVE><header revMajor="1" revMinor="6" name="street"/>
@@ -39,16 +38,6 @@ def site(tmp_path, road):
 def opened(path):
     bpy.ops.wm.open_mainfile(filepath=str(path))
     return bpy.context.scene
-
-
-def test_a_file_that_another_run_builds_is_left_to_it(road, tmp_path):
-    output = tmp_path / "site.blend"
-    command = [str(road), "--near", "1100", "2000", "--radius", "30", "-o", str(output)]
-    with locked_file(output), pytest.raises(SeipError, match="another run is writing"):
-        build_scene.main(command)
-    assert not output.exists()
-    build_scene.main(command)
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["site.blend", "street.xodr"]
 
 
 def test_a_site_file_alone_is_enough(site, tmp_path):

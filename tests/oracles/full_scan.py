@@ -41,9 +41,9 @@ def full_scan(
     visible, rays = np.zeros((len(poses), len(site.targets)), dtype=bool), 0
     for pose, key in enumerate(poses.sensor.tolist()):
         position = ScanPosition(
-            caster, poses.xyz[pose], float(poses.yaw[pose]), [models[key]], settings, site.reflectivity
+            caster, poses.xyz[pose], float(poses.yaw[pose]), models[key], settings, site.reflectivity
         )
         seen, cast = seen_by_tilted_full_scan(position, float(poses.tilt[pose]), surfaces)
-        visible[pose] = seen[0]
+        visible[pose] = seen
         rays += cast
     return visible, rays

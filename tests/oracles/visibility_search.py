@@ -16,7 +16,6 @@ from seip_addon.core.base.progress import finish
 from seip_addon.core.sensing.lidar.carla_dropoff import CarlaDropoff
 from seip_addon.core.sensing.lidar.model import DetectionLaw, LidarModel
 from seip_addon.core.sensing.lidar.range_equation import RangeEquation
-from seip_addon.core.sensing.lidar.rosette import Rosette
 from seip_addon.core.sensing.visibility.grid import compute_visibility
 from seip_addon.core.sensing.visibility.near_surfaces import caster_tolerance
 from seip_addon.core.sensing.visibility.ray_casting import make_ray_caster
@@ -70,9 +69,6 @@ def draw_case(seed: int) -> Case:
     models = {key: _model(random, key, half) for key in ("one", "two")}
     if random.random() < 0.6:  # one, both or none of them look one way, some of them with channels of the other
         models = _looking_one_way(random, models)
-    other = np.random.default_rng((9, seed))  # that earlier scenes stay as they were
-    if other.random() < 0.5:
-        models["rosette"] = _drawing_a_rosette(other, half)
     targets = _targets(random, triangles, delta, 60)
     return Case(
         Site(
@@ -216,19 +212,6 @@ def _looking_one_way(random: np.random.Generator, models: dict[str, LidarModel])
     return models
 
 
-def _drawing_a_rosette(random: np.random.Generator, half: float) -> LidarModel:
-    """Two prisms of any rates, in frames of few rays to many, that look a little to the side or nearly all round."""
-    model = _model(random, "rosette", half)
-    wedge = math.radians(random.uniform(8, 32))
-    rosette = Rosette(
-        (random.uniform(1, 200), -random.uniform(1, 200)),
-        (wedge, wedge * float(random.choice([1.0, random.uniform(0.3, 1.0)]))),
-        random.uniform(1.3, 1.75),
-        float(random.choice([0.0, random.uniform(0, 100)])),
-    )
-    return replace(model, points_per_second=model.rotation_rate * int(random.integers(2, 2000)), rosette=rosette)
-
-
 def _targets(random: np.random.Generator, triangles: Float, delta: float, count: int) -> Float:
     """Points at every offset from the faces: up, down and across, some of them δ away but for rounding."""
     which = random.integers(0, len(triangles), count)
@@ -294,8 +277,6 @@ def assess(case: Case) -> Verdict:
 
 def _rays(model: LidarModel, yaw: float, tilt: float) -> Float:
     """Unit directions of one frame, each from its own angles, turned about y by the tilt and then about z."""
-    if model.rosette is not None:
-        return _turned(behind_prisms(model.rosette, model.points_per_second, model.rotation_rate), yaw, tilt)
     count = max(1, round(model.points_per_second / model.rotation_rate / len(model.elevations)))
     column = np.arange(count) * (2 * math.pi / count)
     if model.field_of_view < 2 * math.pi:
@@ -312,23 +293,6 @@ def _turned(rays: Float, yaw: float, tilt: float) -> Float:
     ahead, up = math.cos(tilt) * x + math.sin(tilt) * z, math.cos(tilt) * z - math.sin(tilt) * x
     turned = (math.cos(yaw) * ahead - math.sin(yaw) * y, math.sin(yaw) * ahead + math.cos(yaw) * y, up)
     return np.stack(turned, axis=1)
-
-
-def behind_prisms(rosette: Rosette, points_per_second: float, frame_rate: float) -> Float:
-    """Directions of a frame's rays one by one: what lies in a face's plane is stretched by the ratio of the indices."""
-    rays = []
-    for number in range(round(points_per_second / frame_rate)):
-        time = rosette.begin + number / points_per_second
-        ray = np.array([1.0, 0.0, 0.0])
-        for side, rate, wedge in zip((-1, 1), rosette.rates, rosette.wedges, strict=True):
-            turn = 2 * math.pi * math.fmod(rate * time, 1.0)
-            oblique = np.array([1.0, side * math.tan(wedge) * math.cos(turn), side * math.tan(wedge) * math.sin(turn)])
-            faces = [np.array([1.0, 0.0, 0.0]), oblique / math.sqrt(oblique @ oblique)]
-            for face, ratio in zip(faces[::-side], (1 / rosette.index, rosette.index), strict=True):
-                within = ratio * (ray - (ray @ face) * face)
-                ray = within + math.sqrt(1.0 - within @ within) * face
-        rays.append(ray)
-    return np.array(rays)
 
 
 def _assess_pose(case: Case, origin: Float, yaw: float, tilt: float, model: LidarModel) -> tuple[Boolean, Boolean]:

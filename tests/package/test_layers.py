@@ -181,7 +181,6 @@ def test_what_is_imported_is_pinned():
     everywhere = ours | {"seip_addon", "headless"} | set(sys.stdlib_module_names) | BLENDERS_OWN
     by_file = {
         "dask_client.py": {"dask", "distributed"},
-        "executors.py": {"distributed"},
         "network_tasks.py": {"distributed"},
         "lock_wheels.py": {"packaging"},
         "extract.py": {"osmium"},

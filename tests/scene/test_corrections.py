@@ -8,8 +8,7 @@ import pytest
 
 from seip_addon.core.sensing.lidar.catalogue import load_catalogue
 from seip_addon.core.sensing.recordings.comparison import Change, RayComparison
-from seip_addon.core.sensing.recordings.figures import CoverageSteps
-from seip_addon.core.sensing.recordings.verification import Verification
+from seip_addon.core.sensing.recordings.verification import CoverageSteps, Verification
 from seip_addon.core.sensing.scans.sensor import MountedSensor
 from seip_addon.core.site.scene_geometry import SceneGeometry
 from seip_addon.core.workflows.verifying import box_triangles

@@ -12,7 +12,7 @@ from seip_addon.core.output.pictures.colours import colouring
 from seip_addon.scene import contract
 from seip_addon.scene.coverage_colours import colour_coverage
 from seip_addon.scene.materials import linear
-from seip_addon.scene.render import labelled_pictures, raw_files, shots_of, silenced, take
+from seip_addon.scene.render import labelled_pictures, raw_files, shots_of, take
 from seip_addon.scene.write import LIFT, clear_result, shown_legend, write_result
 from tests.builders.scene_by_hand import make_scene
 from tests.builders.small_junction import make_example
@@ -118,8 +118,7 @@ def save_rendered_view(path, scene, site, deployment):
     with TemporaryDirectory() as folder:
         shots = shots_of(site, deployment)
         raws = raw_files(Path(folder), shots)
-        with silenced():
-            taken = labelled_pictures(shots, take(shots, scene, raws), raws, site, deployment)
+        taken = labelled_pictures(shots, take(shots, scene, raws), raws, site, deployment)
         labelled_view.save_labelled_view(path, taken.view, site, deployment, shown_legend(scene), taken.sight)
     return taken
 
@@ -185,10 +184,9 @@ def test_the_view_is_from_a_side_without_towers(example, scene, tmp_path, monkey
     mesh = bpy.data.meshes.new("Tower")
     mesh.from_pydata(corners, [], [(0, 1, 2, 3)])
     raws = raw_files(tmp_path, [whole])
-    with silenced():
-        (open_air,) = take([whole], scene, raws)
-        scene.collection.objects.link(bpy.data.objects.new("Tower", mesh))
-        bpy.context.view_layer.update()
-        (walled,) = take([whole], scene, raws)
+    (open_air,) = take([whole], scene, raws)
+    scene.collection.objects.link(bpy.data.objects.new("Tower", mesh))
+    bpy.context.view_layer.update()
+    (walled,) = take([whole], scene, raws)
     assert open_air.viewpoint == 0
     assert (whole.viewpoints[walled.viewpoint].place - middle)[:2] @ towards < 0.0

@@ -15,7 +15,7 @@ from headless.studies.benchmark.placement import METHODS, SolverRun, compare
 from headless.studies.benchmark.report import Findings, requirements, save_page
 from headless.studies.benchmark.scans import scan_costs
 from headless.studies.benchmark.street_visibility import street_problem
-from headless.studies.benchmark.visibility import sampled_positions, visibility_costs
+from headless.studies.benchmark.visibility import sampled_poses, visibility_costs
 
 import bpy
 
@@ -108,7 +108,7 @@ def measure(geometry: SceneGeometry, scope: BenchmarkScope) -> Findings:
         "targets": len(site.targets),
         "poses": len(site.candidates),
         "triangles": len(site.triangles),
-        "positions": len(sampled_positions(site, scope.positions)),
+        "positions": len(sampled_poses(site, scope.positions)),
         "scanned_by": scope.scanned_by,
         "frames": scope.frames,
         "effort": scope.effort,

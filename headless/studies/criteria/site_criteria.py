@@ -53,8 +53,6 @@ def site_criteria(
         Traffic that the criteria of the literature go by; not that of tests.
     keys : sequence of str
         Of `CRITERIA`; coverage comes first whether it is among them or not.
-
-    Those of the literature go by channels, and are left out for rosettes.
     """
     site, visible = survey.site, survey.grid.visible
     returns = yield from survey_returns(survey, Objective(), threads=1)
@@ -96,8 +94,6 @@ def problem_of(survey: Survey, count: int) -> PlacementProblem:
 def _of_literature(survey: Survey, runs: Sequence[SampledRun]) -> Generator[Progress, None, tuple[PoseCriterion, ...]]:
     """Compute EGVS, InSPE and PE-VGOP; the rays of each pose are cast one pose after the other."""
     site, candidates = survey.site, survey.site.candidates
-    if any(model.rosette is not None for model in survey.models.values()):
-        return ()
     voxels = Voxels.over(site.targets)
     occupancy = voxel_occupancy(voxels, runs)
     instants = [TrafficInstant.of(voxels, run.trajectories, run.trajectories.at(time)) for run, time in _instants(runs)]

@@ -211,14 +211,6 @@ BEAM_OFFSET = Limits(-720.0, 720.0, "degrees")
 """Azimuth of a channel ahead of the sensor's head: two turns at most."""
 
 HORIZONTAL_VIEW = Limits(0.001, 360.0, "degrees")
-ACCUMULATION = Limits(0.001, 100.0, "s")
-"""Time over which the points of a rosette make a frame."""
-
-PRISM_RATE = Limits(0.001, 1_000.0, "Hz")
-PRISM_WEDGE = Limits(0.001, 45.0, "degrees")
-REFRACTIVE_INDEX = Limits(1.001, 4.0)
-"""Refractive index of a prism: germanium has 4."""
-
 GAIN = Limits(1e-3, 1e3)
 """Power received, as a multiple of what the law of detection says."""
 

@@ -6,8 +6,8 @@ batch command shows a bar, a test exhausts them with `finish`.
 
 import threading
 import time
-from collections.abc import Callable, Generator
-from concurrent.futures import Future
+from collections.abc import Callable, Generator, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 from contextlib import closing
 from dataclasses import dataclass, replace
 from typing import TypeVar
@@ -15,6 +15,7 @@ from typing import TypeVar
 from .counts import duration_text
 
 Result = TypeVar("Result")
+Item = TypeVar("Item")
 
 REPORT_INTERVAL = 0.1  # seconds between the reports of work in a thread
 
@@ -217,3 +218,20 @@ def in_thread(
         return result.result()
     finally:
         stop.set()
+
+
+def each_in_threads(
+    compute: Callable[[Item], None], items: Sequence[Item], threads: int, what: str
+) -> Generator[Progress, None, None]:
+    """Call a function for each item, several at once; closing the generator cancels calls that have not started."""
+    pool = ThreadPoolExecutor(threads)
+    calls = [pool.submit(compute, item) for item in items]
+    try:
+        for done, call in enumerate(calls):
+            while not wait([call], REPORT_INTERVAL).done:  # so that the caller can close soon
+                yield Progress(done, len(items), what)
+            call.result()
+            yield Progress(done, len(items), what)
+    finally:
+        pool.shutdown(wait=False, cancel_futures=True)
+    yield Progress(len(items), len(items), what)

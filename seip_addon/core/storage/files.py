@@ -32,56 +32,6 @@ _SPACE_ERRORS = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}
 
 
 @contextmanager
-def locked_file(path: Path) -> Iterator[None]:
-    """Lock a file against writing by other processes while the block runs.
-
-    The lock is a separate file next to ``path`` that is removed afterwards: ``path`` itself may not exist yet, and is
-    replaced as a whole. A lock file left by a killed process does not lock anything.
-
-    Raises
-    ------
-    SeipError
-        Another process holds the lock, or the folder cannot be written.
-    """
-    lock = path.parent / f".{path.name}.lock"
-    with _writing(path):
-        made = _make_folder(path.parent)
-        handle = _locked(lock)
-    if handle is None:
-        raise SeipError(f"another run is writing {path}: wait until it has ended, or choose another name")
-    try:
-        yield
-    finally:
-        if sys.platform == "win32":  # Windows cannot delete a file that is open
-            os.close(handle)
-            lock.unlink(missing_ok=True)
-        else:
-            lock.unlink(missing_ok=True)
-            os.close(handle)
-        remove_empty(made)
-
-
-def _locked(lock: Path) -> int | None:
-    """Return the descriptor of the locked file, None if another process holds the lock."""
-    while True:
-        handle = os.open(lock, os.O_RDWR | os.O_CREAT)
-        try:
-            _lock(handle)
-        except OSError as error:
-            if error.errno in _LOCK_ERRORS:
-                os.close(handle)
-                return None
-        try:
-            # The last holder may have removed the name between open and lock. Then the lock is on a file without a
-            # name, which a third process would not see: open the new one.
-            if os.fstat(handle).st_ino == lock.stat().st_ino:
-                return handle
-        except FileNotFoundError:
-            pass  # its last holder has removed it in the meantime
-        os.close(handle)
-
-
-@contextmanager
 def whole_file(path: str | os.PathLike[str]) -> Iterator[Path]:
     """Yield a temporary file next to ``path`` that is renamed to ``path`` after the block.
 
@@ -217,6 +167,24 @@ def unlock_folder(folder: Path, lock: int) -> None:
     if sys.platform == "win32":
         with suppress(OSError):  # another process has it by now
             (folder / _LOCK_NAME).unlink()
+
+
+@contextmanager
+def locked_folder(folder: Path) -> Iterator[None]:
+    """Lock a folder while the block runs; it is created if it is missing, and removed if it stays empty.
+
+    Raises
+    ------
+    SeipError
+        Another process holds the lock, or the folder cannot be written.
+    """
+    made = check_folder(folder)
+    lock = lock_folder(folder)
+    try:
+        yield
+    finally:
+        unlock_folder(folder, lock)
+        remove_empty(made)
 
 
 def natural_order(path: Path) -> list[tuple[int, str]]:

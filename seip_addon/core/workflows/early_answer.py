@@ -19,8 +19,7 @@ from ..choosing.placement.search_limits import SolverLimits
 from ..choosing.placement.solver import solve
 from ..sensing.returns.returns_grid import compute_returns
 from ..sensing.returns.road_users import road_users
-from ..sensing.visibility.grid import compute_visibility
-from ..sensing.visibility.store import read_visibility
+from ..sensing.visibility.grid import compute_visibility, read_visibility
 from .returns import SurveyReturns
 from .survey import Layout
 

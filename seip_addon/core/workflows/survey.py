@@ -13,13 +13,11 @@ from ..base.progress import Progress
 from ..choosing.placement.deployment import Deployment, deploy
 from ..sensing.lidar.carla_dropoff import CarlaDropoff
 from ..sensing.lidar.model import LidarModel, fields_of_view
-from ..sensing.visibility.float32_precision import rounding_warnings
-from ..sensing.visibility.grid import VisibilityGrid, visibility_key
+from ..sensing.visibility.grid import VisibilityGrid, stored_visibility, visibility_key
 from ..sensing.visibility.ray_casting import engine_name
 from ..sensing.visibility.ring_resolution import resolution_warnings
 from ..sensing.visibility.road_range import range_warnings, road_reflectivity
 from ..sensing.visibility.settings import VisibilitySettings
-from ..sensing.visibility.store import stored_visibility
 from ..sensing.visibility.surroundings import Surroundings
 from ..sensing.weather import Weather
 from ..site.candidates import assumed_pole_warnings
@@ -94,7 +92,6 @@ def lay_out(geometry: SceneGeometry, settings: SurveySettings, warnings: Sequenc
         *far,
         *bareness_warnings(near, np.concatenate([site.candidates.xyz[:, :2], site.targets.xyz[:, :2]])),
         *assumed_pole_warnings(geometry, site.candidates),
-        *rounding_warnings(near),
         *resolution_warnings(site, models, settings.visibility),
         *carla_warnings(models, settings),
         *range_warnings(site, models, road_reflectivity(geometry.roads), settings.visibility),
@@ -138,24 +135,18 @@ def grid_key(layout: Layout) -> str:
     return visibility_key(layout.site, layout.models, settings.visibility, engine_name(settings.engine))
 
 
-def see(
-    layout: Layout, path: Path, scheduler: str | None = None, threads: int | None = None
-) -> Generator[Progress, None, Survey]:
+def see(layout: Layout, path: Path, threads: int | None = None) -> Generator[Progress, None, Survey]:
     """Compute the visibility grid of a layout, or read it from a file if it was computed from the same inputs.
 
     Parameters
     ----------
     path : path
         File of the grid, read and written.
-    scheduler : str, optional
-        Address of a Dask scheduler whose workers compute the grid.
     threads : int, optional
         Maximum number of threads.
     """
     settings = layout.settings
-    grid = yield from stored_visibility(
-        path, layout.site, layout.models, settings.visibility, settings.engine, scheduler, threads
-    )
+    grid = yield from stored_visibility(path, layout.site, layout.models, settings.visibility, settings.engine, threads)
     return with_grid(layout, grid, path)
 
 

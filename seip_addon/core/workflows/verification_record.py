@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from ..base.distinct_names import distinct_names
-from ..output.pictures.verification import save_changes_picture, save_returns_chart
-from ..output.results.file_names import VERIFICATION_FILE, VERIFICATION_PICTURES
+from ..output.pictures.verification import save_changes_picture
+from ..output.results.file_names import VERIFICATION_FILE, VERIFICATION_PICTURE
 from ..output.results.verification_record import SCHEMA, RecordedChange, VerificationRecord
 from ..sensing.recordings.verification import Verification
 from ..sensing.scans.sensor import MountedSensor
@@ -42,9 +42,7 @@ def write_verification(
     versions : mapping of str to str
         Versions of the program and its libraries.
     """
-    changes, returns = VERIFICATION_PICTURES
-    save_changes_picture(folder / changes, geometry, planned, found)
-    save_returns_chart(folder / returns, found)
+    save_changes_picture(folder / VERIFICATION_PICTURE, geometry, planned, found)
     save_changes(folder / CHANGES_FILE, found)
     save_units(folder / UNITS_FILE, recording, found)
     record = verification_record(geometry.name, recording, found)

@@ -12,7 +12,7 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from ..base.arrays import Boolean, Float, Integer
+from ..base.arrays import Boolean, Float
 from ..base.errors import SeipError
 from ..base.progress import Progress
 from ..geometry.plan import surface_height
@@ -26,12 +26,16 @@ from ..sensing.recordings.comparison import (
     gone_objects,
     new_objects,
 )
-from ..sensing.recordings.figures import CoverageSteps, Gain, ReturnShare
-from ..sensing.recordings.recording import Recording
+from ..sensing.recordings.recording import Recording, SensorRecording
 from ..sensing.recordings.registration import Registration, register
-from ..sensing.recordings.sensor_recording import SensorRecording
-from ..sensing.recordings.unit_gain import fitted_gain, return_shares
-from ..sensing.recordings.verification import InstalledSensor, RecordedBackground, Verification
+from ..sensing.recordings.unit_gain import fitted_gain
+from ..sensing.recordings.verification import (
+    CoverageSteps,
+    Gain,
+    InstalledSensor,
+    RecordedBackground,
+    Verification,
+)
 from ..sensing.scans.scanner import ReflectiveSurface
 from ..sensing.scans.sensor import MountedSensor
 from ..sensing.scans.static_scene import StaticScene, static_scene
@@ -74,7 +78,6 @@ def verify(
     pairs = _paired(planned, recording)
     static = static_scene(geometry, planned)
     surface = _surface(static, engine)
-    kinds = _kinds(geometry, static.triangles)
     fitted: list[tuple[Registration, Background]] = []
     for sensor, record in pairs:
         background = yield from learn_background(record, sensor.model)
@@ -88,9 +91,7 @@ def verify(
     comparisons = [_without_gone(one, changes) for one in comparisons]
     sensors = []
     for (pose, background), one in zip(fitted, comparisons, strict=True):
-        gain = fitted_gain(one)
-        shares = return_shares(one, gain.value if gain else 1.0, kinds)
-        sensors.append(_installed(pose, background, gain, shares))
+        sensors.append(_installed(pose, background, fitted_gain(one)))
     targets = generate_targets(geometry.region, road, spacing, geometry.weighted_regions)
     corrected = _corrected(geometry, static, changes)
 
@@ -135,9 +136,7 @@ def verify(
     )
 
 
-def _installed(
-    pose: Registration, background: Background, gain: Gain | None, returns: Sequence[ReturnShare]
-) -> InstalledSensor:
+def _installed(pose: Registration, background: Background, gain: Gain | None) -> InstalledSensor:
     return InstalledSensor(
         id=pose.sensor.label,
         sensor=pose.sensor.model.key,
@@ -150,7 +149,6 @@ def _installed(
         match=pose.match,
         background=RecordedBackground(background.sweeps, background.seconds, background.uncertain),
         gain=gain,
-        returns=tuple(returns),
     )
 
 
@@ -199,16 +197,6 @@ def _is_at(change: Change, earlier: BaseGeometry) -> bool:
 
 def _surface(static: StaticScene, engine: Engine) -> ReflectiveSurface:
     return ReflectiveSurface(make_ray_caster(static.triangles, engine), static.reflectivity)
-
-
-def _kinds(geometry: SceneGeometry, triangles: Float) -> list[tuple[str, Integer]]:
-    """Return the triangles of roads, of other ground and of objects."""
-    rows = [row.tobytes() for row in triangles]
-    found = []
-    for name, meshes in (("road", geometry.roads), ("ground", geometry.ground), ("objects", geometry.occluders)):
-        own = {row.tobytes() for mesh in meshes for row in mesh.triangles}
-        found.append((name, np.array([number for number, row in enumerate(rows) if row in own], dtype=np.int64)))
-    return found
 
 
 def _without_gone(comparison: RayComparison, changes: Sequence[Change]) -> RayComparison:

@@ -11,14 +11,11 @@ from pathlib import Path
 import pytest
 
 from seip_addon.core.base.errors import SeipError
-from seip_addon.core.storage.files import lock_folder, locked_file, save_json, whole_file
+from seip_addon.core.storage.files import lock_folder, locked_folder, save_json, whole_file
 
 ROOT = Path(__file__).resolve().parents[3]
 HOLD = "import sys, time; from pathlib import Path; from seip_addon.core.storage.files import *; "
 LOCK = HOLD + "lock_folder(Path(sys.argv[1])); print('held', flush=True); time.sleep(60)"
-LOCK_FILE = (
-    HOLD + "l = locked_file(Path(sys.argv[1]) / 'a.blend'); l.__enter__(); print('held', flush=True); time.sleep(60)"
-)
 WRITE = HOLD + "part = whole_file(Path(sys.argv[1]) / 'a.json'); print(part.__enter__(), flush=True); time.sleep(60)"
 
 
@@ -66,24 +63,9 @@ def test_the_next_run_removes_what_a_killed_one_left_and_nothing_else(tmp_path, 
     assert living.exists()
 
 
-def test_a_file_that_another_run_writes_is_refused_until_that_ends_however_it_ends(tmp_path, other):
-    process, said = other(LOCK_FILE, tmp_path)
-    assert said == "held"
-    refused = pytest.raises(SeipError, match=r"another run is writing .*a\.blend: wait until it has ended")
-    with refused, locked_file(tmp_path / "a.blend"):
-        pass
-    with locked_file(tmp_path / "b.blend"):
-        assert (tmp_path / ".b.blend.lock").exists()
-    process.send_signal(signal.SIGKILL)
-    process.wait()
-    with locked_file(tmp_path / "a.blend"):
-        pass
-    assert list(tmp_path.iterdir()) == []
-
-
 def test_a_folder_that_is_made_for_a_file_goes_with_it(tmp_path):
     path = tmp_path / "a" / "b" / "file.json"
-    with pytest.raises(ZeroDivisionError), locked_file(path), whole_file(path):
+    with pytest.raises(ZeroDivisionError), locked_folder(path.parent), whole_file(path):
         raise ZeroDivisionError
     assert list(tmp_path.iterdir()) == []
     (tmp_path / "a").mkdir()

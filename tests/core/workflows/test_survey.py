@@ -17,8 +17,8 @@ def test_the_grid_is_that_of_each_pose_alone(small_survey):
     seen = small_survey.grid.visible
     for pose in range(0, len(site.candidates), 7):
         model = small_survey.models[str(site.candidates.sensor[pose])]
-        alone, _ = one_by_one.see_upright([model], site.candidates.xyz[pose], float(site.candidates.yaw[pose]))
-        np.testing.assert_array_equal(seen[pose], alone[0])
+        alone, _ = one_by_one.scan_upright(model, site.candidates.xyz[pose], float(site.candidates.yaw[pose]))
+        np.testing.assert_array_equal(seen[pose], alone)
 
 
 def test_a_stored_grid_is_read_and_not_computed_again(small_survey, small_layout, monkeypatch):
@@ -27,7 +27,7 @@ def test_a_stored_grid_is_read_and_not_computed_again(small_survey, small_layout
     def none_cast(*_args, **_kwargs):
         raise AssertionError("rays were cast again")
 
-    monkeypatch.setattr("seip_addon.core.sensing.visibility.store.compute_visibility", none_cast)
+    monkeypatch.setattr("seip_addon.core.sensing.visibility.grid.compute_visibility", none_cast)
     again = finish(see(small_layout, path))
     assert again.grid.key == small_survey.grid.key
     np.testing.assert_array_equal(again.grid.packed, small_survey.grid.packed)

@@ -39,9 +39,8 @@ def with_gain_band(around: Surroundings, deployment: Deployment) -> Generator[Pr
     seen = np.zeros((2 + 2 * len(compared), len(around.site.targets)), dtype=bool)
     for done, sensor in enumerate(sensors):
         yield Progress(done, len(sensors), "coverage over plausible gains")
-        # rays from one position are shared by all variants
         variants = [model.amplified(gain) for model in (sensor.model, *compared) for gain in model.gains]
-        seen |= visibility.see_all(variants, sensor.xyz, sensor.orientation)[0]
+        seen |= np.array([visibility.see(variant, sensor.xyz, sensor.orientation) for variant in variants])
     shares = [float(row.mean()) for row in seen]
     band = GainBand(
         low=min(shares[0], deployment.coverage),

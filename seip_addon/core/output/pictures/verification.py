@@ -1,4 +1,4 @@
-"""Pictures of a verification: what differs from the plan, and how much returns."""
+"""Picture of a verification: what differs from the plan."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ...sensing.recordings.comparison import AGREES, FARTHER, NEARER, VEHICLE
 from ...sensing.recordings.verification import Verification
 from ...sensing.scans.sensor import MountedSensor
 from ...site.scene_geometry import SceneGeometry
-from .chart_style import colour, limits_around, mark, new_figure, save_chart, style_axes
+from .chart_style import limits_around, new_figure, save_chart
 from .drawing import box_corners, draw_attribution, draw_polygons
 from .palette import COMPARED_COLOURS, GONE_COLOUR, INK, NEW_COLOUR, SENSOR_BODY, SOFT_INK, STATIC_COLOUR
 
@@ -71,25 +71,3 @@ def _draw_points(panel: Axes, found: Verification) -> None:
         xy = xy[:: max(1, len(xy) // _MOST_POINTS)]
         panel.scatter(xy[:, 0], xy[:, 1], s=_POINT, color=tone, linewidth=0, zorder=2, rasterized=True)
         panel.scatter([], [], s=20, color=tone, label=words)
-
-
-def save_returns_chart(path: str | os.PathLike[str], found: Verification) -> None:
-    """Draw the share of rays that return against range, of each sensor: recorded, by its model, and with its gain."""
-    figure, panels = new_figure(4.6 * len(found.sensors), 4.2, len(found.sensors), sharey=True)
-    for number, (panel, one) in enumerate(zip(panels, found.sensors, strict=True)):
-        for row, surface in enumerate(sorted({share.surface for share in one.returns})):
-            own = [share for share in one.returns if share.surface == surface]
-            middle = [(share.low + share.high) / 2 for share in own]
-            words = surface if number == 0 else None
-            panel.plot(middle, [share.measured for share in own], mark(row), color=colour(row), label=words)
-            panel.plot(middle, [share.fitted for share in own], color=colour(row))
-            panel.plot(middle, [share.predicted for share in own], color=colour(row), linestyle=":", alpha=0.8)
-        gain = "" if one.gain is None else f", gain {one.gain.value:.2f} ({one.gain.low:.2f} to {one.gain.high:.2f})"
-        panel.set_title(f"{one.id}{gain}", fontsize=10, color=INK)
-        panel.set_ylim(0, 1.05)
-        style_axes(panel, "range (m)", "share of rays that return" if number == 0 else "")
-    if len(panels):
-        panels[0].plot([], [], linestyle="", label="marks: recorded")  # each surface has a mark of its own
-        panels[0].plot([], [], color=SOFT_INK, label="model with the unit's gain")
-        panels[0].plot([], [], color=SOFT_INK, linestyle=":", label="model")
-    save_chart(path, figure, "Returns by range", panels)

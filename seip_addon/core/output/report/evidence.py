@@ -20,7 +20,7 @@ from ..results.file_names import (
     TRAFFIC_PICTURES,
     VERIFICATION_FILE,
     VERIFICATION_FOLDER,
-    VERIFICATION_PICTURES,
+    VERIFICATION_PICTURE,
 )
 from ..results.placement_record import PlacementRecord, RecordedSensor, load_placement
 from ..results.site_file import SiteFile, load_site_file
@@ -111,8 +111,8 @@ def load_evidence(folder: Path) -> Evidence:
     pictures = {name: _picture(folder / name) for name in names if (folder / name).is_file()}
     verification = _verification(folder / VERIFICATION_FOLDER, record)
     if verification is not None:
-        paths = [folder / VERIFICATION_FOLDER / name for name in VERIFICATION_PICTURES]
-        pictures |= {path.name: _picture(path, "verify the installation again") for path in paths if path.is_file()}
+        path = folder / VERIFICATION_FOLDER / VERIFICATION_PICTURE
+        pictures |= {path.name: _picture(path, "verify the installation again")} if path.is_file() else {}
     sheet, shown = folder / CLOSE_UPS, []
     try:
         if sheet.is_file() and record.sensors:

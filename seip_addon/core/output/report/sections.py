@@ -37,7 +37,6 @@ from ..results.verification_record import (
     gain_text,
     objects,
     pose_text,
-    returns_sentence,
     signed_points,
     vehicles,
 )
@@ -229,15 +228,8 @@ def _verification(evidence: Evidence) -> Iterator[Block]:
     if missing:
         yield Paragraph(f"The recording does not contain {', '.join(missing)}: the coverage above is without.")
     for one in found.sensors:
-        lines = (pose_text(one), " ".join(part for part in (gain_text(one), returns_sentence(one)) if part))
-        yield Card(f"{one.id} as installed", tuple(Paragraph(line) for line in lines))
-    if "returns.png" in evidence.pictures:
-        yield Picture(
-            evidence.pictures["returns.png"],
-            "Share of the beams that return from each kind of surface, by distance: recorded (marks), promised "
-            "(dotted) and with the gain of the unit (lines). The gain is the power that the unit receives, as a "
-            "multiple of that in its model.",
-        )
+        lines = (pose_text(one), gain_text(one))
+        yield Card(f"{one.id} as installed", tuple(Paragraph(line) for line in lines if line))
     yield from _changes(evidence, objects(found))
     standing = vehicles(found)
     if standing:

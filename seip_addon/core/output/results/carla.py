@@ -63,12 +63,11 @@ def _spawn(sensor: Sensor, origin: NDArray[np.float64]) -> dict[str, Any]:
 
 def _attributes(sensor: Sensor) -> dict[str, str]:
     model = sensor.model
-    half = model.field_of_view / 2
-    low, high = (model.elevations.min(), model.elevations.max()) if model.rosette is None else (-half, half)
+    low, high = model.elevations.min(), model.elevations.max()
     dropoff = model.law if isinstance(model.law, CarlaDropoff) else model.law.as_dropoff()
     values = {
         "role_name": sensor.label,
-        "channels": _rows(model),
+        "channels": model.channels,
         "range": model.max_range,
         "points_per_second": round(model.points_per_second),
         "rotation_frequency": model.rotation_rate,
@@ -84,33 +83,22 @@ def _attributes(sensor: Sensor) -> dict[str, str]:
     return {name: f"{value:.10g}" if isinstance(value, float) else str(value) for name, value in values.items()}
 
 
-def _rows(model: LidarModel) -> int:
-    """Return the channels of CARLA's raster; for a rosette the number that makes its steps equal in both directions."""
-    return model.channels if model.rosette is None else max(2, math.isqrt(model.channels))
-
-
 def _note(model: LidarModel) -> str:
     """Return what CARLA cannot express, or ""."""
     parts = []
-    if model.rosette is not None:
+    descending = np.sort(model.elevations)[::-1]
+    off = np.abs(descending - np.linspace(descending[0], descending[-1], len(descending))).max()
+    if off > EVEN_WITHIN:
         parts.append(
-            f"draws a rosette of {math.degrees(model.field_of_view):.3g} degrees that does not repeat, where CARLA "
-            f"repeats an even raster of {_rows(model)} rows over the enclosing square, with the same number of points"
+            f"spaces its {len(descending)} channels unevenly, where CARLA spreads them evenly over the same field "
+            f"of view, so that its beams are up to {math.degrees(off):.1f} degrees off in elevation"
         )
-    else:
-        descending = np.sort(model.elevations)[::-1]
-        off = np.abs(descending - np.linspace(descending[0], descending[-1], len(descending))).max()
-        if off > EVEN_WITHIN:
-            parts.append(
-                f"spaces its {len(descending)} channels unevenly, where CARLA spreads them evenly over the same field "
-                f"of view, so that its beams are up to {math.degrees(off):.1f} degrees off in elevation"
-            )
-        ahead = np.abs(model.azimuth_offsets).max()
-        if ahead > 0.0:
-            parts.append(
-                f"fires channels up to {math.degrees(ahead):.2f} degrees of azimuth off the direction of its head, "
-                "where CARLA fires all along it"
-            )
+    ahead = np.abs(model.azimuth_offsets).max()
+    if ahead > 0.0:
+        parts.append(
+            f"fires channels up to {math.degrees(ahead):.2f} degrees of azimuth off the direction of its head, "
+            "where CARLA fires all along it"
+        )
     if not isinstance(model.law, CarlaDropoff):
         parts.append(
             f"detects a surface by its reflectivity and angle, where CARLA loses returns by range alone: the drop-"

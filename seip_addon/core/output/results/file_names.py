@@ -6,4 +6,4 @@ REPORT_FILES = ("report.html", "report.pdf")
 VERIFICATION_FOLDER = "verification"
 """Folder in that of a placement, for the verification of its installation."""
 VERIFICATION_FILE = "verification.json"
-VERIFICATION_PICTURES = ("changes.png", "returns.png")
+VERIFICATION_PICTURE = "changes.png"

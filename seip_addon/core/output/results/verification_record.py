@@ -10,8 +10,7 @@ from pathlib import Path
 from typing import Literal
 
 from ...base.counts import counted
-from ...sensing.recordings.figures import CoverageSteps
-from ...sensing.recordings.verification import InstalledSensor
+from ...sensing.recordings.verification import CoverageSteps, InstalledSensor
 from ...site.locations import direction
 from ...storage.files import read_small
 from ...storage.json_dataclass import read_record
@@ -98,18 +97,6 @@ def gain_text(pose: InstalledSensor) -> str:
     if gain.low <= 1.0 <= gain.high:
         return f"{says}, which does not differ significantly from its model: its range is as promised."
     return f"{says}: it detects the same surface up to about {reach:.0%} of the distance ({low:.0%} to {high:.0%})."
-
-
-def returns_sentence(pose: InstalledSensor) -> str:
-    """Return the range at which returns from the road differ most from the promise, or "" without any."""
-    road = [one for one in pose.returns if one.surface == "road"]
-    if not road:
-        return ""
-    most = max(road, key=lambda one: abs(one.measured - one.predicted))
-    return (
-        f"Of its beams that meet the road at {most.low:g} to {most.high:g} m, {most.measured:.0%} return; "
-        f"{most.predicted:.0%} were promised."
-    )
 
 
 def change_text(change: RecordedChange) -> str:

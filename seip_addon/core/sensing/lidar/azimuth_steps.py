@@ -6,11 +6,11 @@ import math
 
 import numpy as np
 
-from ...base.arrays import Boolean, Float, Integer
+from ...base.arrays import Float, Integer
 
 
 def steps_in_arcs(
-    azimuth: Float, half_width: Float, size: Float, steps: Integer, all_round: Boolean
+    azimuth: Float, half_width: Float, size: float, steps: int, *, all_round: bool
 ) -> tuple[Integer, Integer, Integer]:
     """Find the rows of neighbouring azimuth steps in arcs.
 
@@ -20,11 +20,11 @@ def steps_in_arcs(
         Azimuth of the middle of each arc, from step 0 of its channel.
     half_width : (k,) float64, radians
         Half the width of each arc; half a turn or more is the full circle.
-    size : (k,) float64, radians
+    size : float, radians
         Size of a step.
-    steps : (k,) int64
-        Number of steps of the channel.
-    all_round : (k,) bool
+    steps : int
+        Number of steps of a channel.
+    all_round : bool
         Whether step 0 follows the last one. If not, an arc over both ends of the field of view has two rows.
 
     Returns
@@ -32,23 +32,20 @@ def steps_in_arcs(
     arc : (n,) int64
         Arc of each row, ascending.
     first : (n,) int64
-        First step; it may be negative or beyond the revolution if the channel goes all round.
+        First step; it may be negative or beyond the revolution if the channels go all round.
     width : (n,) int64
         Number of steps, at least 1. Rows of one arc have no step in common.
     """
     arc = np.arange(len(azimuth))
-    lowest, end = np.full(len(arc), -math.inf), np.full(len(arc), math.inf)
-    if not all_round.all():
-        in_one = all_round | (half_width >= math.pi)
-        arc = np.repeat(arc, np.where(in_one, 1, 3))
-        azimuth, half_width, size, steps, limited = (
-            values[arc] for values in (azimuth, half_width, size, steps, ~all_round)
-        )
+    lowest, end = -math.inf, math.inf
+    if not all_round:
+        full = half_width >= math.pi
+        arc = np.repeat(arc, np.where(full, 1, 3))
         # steps of a limited field of view lie within a turn from step 0 on: arcs there, a turn before and one after
-        azimuth = np.where(limited, azimuth % math.tau, azimuth)
-        azimuth[~in_one[arc]] += np.tile((-math.tau, 0.0, math.tau), int((~in_one).sum()))
-        half_width = np.where(limited & in_one[arc], math.inf, half_width)
-        lowest, end = np.where(limited, 0.0, -math.inf), np.where(limited, steps, math.inf)
+        azimuth, in_one = azimuth[arc] % math.tau, full[arc]
+        azimuth[~in_one] += np.tile((-math.tau, 0.0, math.tau), int((~full).sum()))
+        half_width = np.where(in_one, math.inf, half_width[arc])
+        lowest, end = 0.0, steps
     first = np.clip(np.ceil((azimuth - half_width) / size), lowest, end).astype(np.int64)
     last = np.clip(np.floor((azimuth + half_width) / size), lowest - 1, end - 1).astype(np.int64)
     width = np.minimum(last - first + 1, steps)

@@ -15,12 +15,11 @@ from typing import Any, TypeGuard
 import numpy as np
 
 from ...base.errors import SeipError
-from ...base.limits import ACCUMULATION, CHANNELS, GAIN
+from ...base.limits import CHANNELS, GAIN
 from ...storage.toml_table import Key, number, parse_toml, read_table, toml_text
 from .carla_dropoff import CarlaDropoff
 from .model import DetectionLaw, LidarModel
 from .range_equation import MAKER_PROBABILITY, RangeEquation
-from .rosette import Rosette
 
 _CALIBRATION_SUFFIXES = {".json", ".xml", ".yaml", ".yml", ".csv"}  # of single units, as makers deliver them
 CALIBRATED = (1.0, 1.0)
@@ -48,7 +47,6 @@ _DROPOFF = {
     "dropoff_zero_intensity": "zero_intensity",
 }
 """Figures of `CarlaDropoff`, by their names in a catalogue."""
-_VIEW_TOLERANCE = 0.1  # degrees: the rounding of data sheets
 
 
 def load_catalogue(extra: Iterable[str | os.PathLike[str]] = ()) -> dict[str, LidarModel]:
@@ -147,7 +145,6 @@ def _model(key: str, table: Any, file: str) -> LidarModel:  # noqa: ANN401 - wha
     if not isinstance(table, dict):
         raise SeipError(f"{where} is not a table; write [{key}] and its values below it")
     values = read_table(table, where, _keys(table, where))
-    rosette = _rosette(values, where) if "pattern" in values else None
     if "channels" in values:
         low, high = values.pop("field_of_view_deg")
         if not low < high:
@@ -184,7 +181,6 @@ def _model(key: str, table: Any, file: str) -> LidarModel:  # noqa: ANN401 - wha
             calibration=calibration,
             gains=tuple(gains or (CALIBRATED if calibration else likely)),
             field_of_view=field_of_view,
-            rosette=rosette,
             **angles,
             **given,
         )
@@ -195,35 +191,9 @@ def _model(key: str, table: Any, file: str) -> LidarModel:  # noqa: ANN401 - wha
 
 def _keys(table: Mapping[str, Any], where: str) -> dict[str, Key]:
     """Return the keys that a table may have, which depend on the form of its beams."""
-    if "pattern" in table:
-        strange = sorted(((_ROTATION | _EVEN | _UNEVEN).keys() - _ROSETTE.keys()) & table.keys())
-        if strange:
-            raise SeipError(f"{where}: {strange[0]} is not a figure of a rosette: leave it out, or leave out pattern")
-        return _KEYS | _ROSETTE
     if "elevations_deg" in table and _EVEN.keys() & table.keys():
         raise SeipError(f"{where}: give either elevations_deg or {', '.join(_EVEN)}")
     return _KEYS | _ROTATION | (_UNEVEN if "elevations_deg" in table else _EVEN)
-
-
-def _rosette(values: dict[str, Any], where: str) -> Rosette:
-    """Replace the figures of a rosette in the values of a table by those of a model, and return the rosette."""
-    figures = {name: values.pop(name) for name in _ROSETTE}
-    time, view = figures["accumulation_s"], figures["horizontal_field_of_view_deg"]
-    try:
-        (one, other), (first, second) = figures["prism_rates_rpm"], figures["prism_wedges_deg"]
-        wedges = math.radians(first), math.radians(second)
-        rosette = Rosette((one / 60.0, other / 60.0), wedges, figures["refractive_index"])
-    except SeipError as error:
-        raise SeipError(f"{where}: {error}") from error
-    drawn = 2 * math.degrees(rosette.reach)
-    if not abs(drawn - view) <= _VIEW_TOLERANCE:
-        raise SeipError(
-            f"{where}: its prisms draw a circle of {drawn:.1f} degrees, but horizontal_field_of_view_deg is {view:g}: "
-            "correct one of them"
-        )
-    values |= {"rotation_rate_hz": 1.0 / time, "elevations_deg": (), "azimuth_offsets_deg": ()}
-    values["horizontal_field_of_view_deg"] = view
-    return rosette
 
 
 def _dropoff(given: Mapping[str, float]) -> CarlaDropoff:
@@ -295,12 +265,6 @@ def _law(value: object) -> str:
     return str(value)
 
 
-def _pattern(value: object) -> str:
-    if value != "rosette":
-        raise ValueError(f"must be 'rosette', or left out where there are channels, not {value!r}")
-    return str(value)
-
-
 def _channels(value: object) -> int:
     if not isinstance(value, int) or isinstance(value, bool) or not CHANNELS.allow(value):
         raise ValueError(f"must be a whole number from {CHANNELS}, not {value!r}")
@@ -351,13 +315,3 @@ _ROTATION = {
 _EVEN = {"channels": Key(_channels), "field_of_view_deg": Key(_pair)}
 _UNEVEN = {"elevations_deg": Key(_numbers)}
 """Keys of beams at even elevations between two limits, and of beams at given elevations."""
-
-_ROSETTE = {
-    "pattern": Key(_pattern),
-    "prism_rates_rpm": Key(_pair),
-    "prism_wedges_deg": Key(_pair),
-    "refractive_index": Key(_number),
-    "horizontal_field_of_view_deg": Key(_number),
-    "accumulation_s": Key(number(ACCUMULATION), 0.1),
-}
-"""Keys of a rosette: two prisms instead of rotating channels."""

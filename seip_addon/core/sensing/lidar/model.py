@@ -15,14 +15,11 @@ from ...base.errors import SeipError
 from ...base.limits import Limits
 from .carla_dropoff import CarlaDropoff
 from .range_equation import RangeEquation
-from .rosette import Rosette
 
 DetectionLaw = RangeEquation | CarlaDropoff
 """Law by which returns are detected: physical, or the one of CARLA."""
 MAX_RAYS = 50_000_000
 """Limit on the rays of a revolution: fifty times the finest type of the study."""
-MAX_ROSETTE_RAYS = 2_000_000
-"""Limit on the rays of a rosette's frame: twenty seconds of a sensor of 100,000 points per second."""
 
 
 def short_name(name: str) -> str:
@@ -32,10 +29,7 @@ def short_name(name: str) -> str:
 
 @dataclass(frozen=True, eq=False)
 class LidarModel:
-    """A LiDAR that rotates, scans a limited horizontal field of view in columns, or draws a rosette.
-
-    Each ray of a rosette is a channel of its own with one azimuth step, in the order of emission. Its elevations,
-    azimuth offsets and field of view are computed from the rosette; given values are ignored.
+    """A LiDAR that rotates, or scans a limited horizontal field of view in columns.
 
     Parameters
     ----------
@@ -52,8 +46,7 @@ class LidarModel:
     points_per_second : float
         Rate of single returns of all channels together.
     rotation_rate : float, hertz
-        Revolutions per second, or frames per second if the field of view is limited. A frame of a rosette has all rays
-        that are emitted in that time.
+        Revolutions per second, or frames per second if the field of view is limited.
     price_range : tuple of two floats, US dollars
         Lowest and highest price.
     price_source : str
@@ -77,8 +70,6 @@ class LidarModel:
         law, and for one that counts every return.
     assumed_beams, assumed_law : str
         Assumptions about the beams and about the law that no document confirms; empty if all is published.
-    rosette : Rosette, optional
-        Prisms of a sensor whose pattern does not repeat.
 
     Examples
     --------
@@ -112,27 +103,11 @@ class LidarModel:
     gains: tuple[float, float] = (1.0, 1.0)
     assumed_beams: str = ""
     assumed_law: str = ""
-    rosette: Rosette | None = None
 
     def __post_init__(self) -> None:
-        if self.rosette is not None:
-            self._draw(self.rosette)
         if self.azimuth_offsets.size == 0:
             object.__setattr__(self, "azimuth_offsets", np.zeros(len(self.elevations)))
         _require_valid(self)
-
-    def _draw(self, rosette: Rosette) -> None:
-        """Set the angles to those of the rays of one frame."""
-        points = self.points_per_second
-        if not 2 * self.rotation_rate <= points <= MAX_ROSETTE_RAYS * self.rotation_rate:
-            raise SeipError(
-                f"LiDAR '{self.key}': a rosette must be accumulated over 2 to {MAX_ROSETTE_RAYS:,} points: with "
-                f"{points:g} points per second take another time"
-            )
-        x, y, z = rosette.directions(np.arange(round(points / self.rotation_rate)) / points).T
-        object.__setattr__(self, "elevations", np.arctan2(z, np.hypot(x, y)))
-        object.__setattr__(self, "azimuth_offsets", np.arctan2(y, x))
-        object.__setattr__(self, "field_of_view", 2 * rosette.reach)
 
     @property
     def short_name(self) -> str:
@@ -165,13 +140,8 @@ class LidarModel:
         return 0.0 if self.all_round else (self.azimuth_step - self.field_of_view) / 2
 
     def faces(self, vectors: Float) -> Boolean:
-        """Return which vectors (n, 3) in the sensor's axes lie within its horizontal field of view, (n,) bool.
-
-        The field of view of a rosette is a circle about its axis.
-        """
-        x, y, z = vectors.T
-        across = y if self.rosette is None else np.hypot(y, z)
-        within: Boolean = np.abs(np.arctan2(across, x)) <= self.field_of_view / 2
+        """Return which vectors (n, 3) in the sensor's axes lie within its horizontal field of view, (n,) bool."""
+        within: Boolean = np.abs(np.arctan2(vectors[:, 1], vectors[:, 0])) <= self.field_of_view / 2
         return within
 
     @property
@@ -194,17 +164,8 @@ class LidarModel:
         steps = (float(self.azimuth_count), self.field_of_view)
         return hashlib.sha256(np.concatenate([self.elevations, self.azimuth_offsets, steps]).tobytes()).hexdigest()[:16]
 
-    def at(self, time: float) -> LidarModel:
-        """Return the sensor with the directions of the frame that begins at a time in seconds; only a rosette's change.
-
-        A rosette continues where the previous frame ended.
-        """
-        return self if self.rosette is None else replace(self, rosette=self.rosette.later(time))
-
     def delay(self, ray: Integer) -> Float:
         """Return the time of rays (n,) int64 after the beginning of the revolution or frame, (n,) float64, seconds."""
-        if self.rosette is not None:
-            return ray / self.points_per_second
         steps = self.azimuth_count
         order = ray % steps
         if self.clockwise:  # all round it begins at azimuth zero, else at the other end of the field of view

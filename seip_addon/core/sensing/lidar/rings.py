@@ -1,8 +1,7 @@
-"""The rings that a LiDAR's beams draw on a flat road, or its rosette, and the edges of its field of view."""
+"""The rings that a LiDAR's beams draw on a flat road, and the edges of its field of view."""
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,7 +11,6 @@ from .beams import BeamPattern
 from .model import LidarModel
 
 RING_AZIMUTHS = 120
-RIM_BEAMS = 12
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,13 +20,13 @@ class BeamRings:
     Parameters
     ----------
     rings : (n, 2, 3) float64, metres
-        Segments of the rings on the road, or of the line that a rosette draws there in a frame.
+        Segments of the rings on the road.
     wide : (n,) bool
         Whether the distance to the next inner ring is larger than the given gap, so that a target may lie between the
-        two. For a rosette: whether the segment is beyond the radius without gaps.
+        two.
     cone : (m, 2, 3) float64, metres
         Beams of the lowest and the highest channel, from the sensor to the road or to the end of its range, at a few
-        azimuths; the first and the last are the borders of a limited field of view. For a rosette: beams at the rim.
+        azimuths; the first and the last are the borders of a limited field of view.
     """
 
     rings: Float
@@ -36,9 +34,7 @@ class BeamRings:
     cone: Float
 
 
-def beam_rings(
-    model: LidarModel, place: Float, axes: Float, ground: float, gap: float, resolved: float = math.inf
-) -> BeamRings:
+def beam_rings(model: LidarModel, place: Float, axes: Float, ground: float, gap: float) -> BeamRings:
     """Return the rings of a sensor on a flat road, and the edges of its field of view.
 
     Parameters
@@ -51,11 +47,7 @@ def beam_rings(
         Height of the road.
     gap : float, metres
         Largest distance between rings that leaves no gap: twice δ.
-    resolved : float, metres
-        Radius up to which a rosette leaves no gaps.
     """
-    if model.rosette is not None:
-        return _rosette_lines(model, place, axes, ground, resolved)
     beams = _directions(model) @ axes.T
     hits, meets = _on_road(model, place, beams, ground)
     inwards = np.full(meets.shape, np.inf)  # to the next ring, along each azimuth
@@ -69,20 +61,6 @@ def beam_rings(
     edges = ends[[0, -1]][:, across].reshape(-1, 3)
     cone = np.stack([np.broadcast_to(place, edges.shape), edges], axis=1)
     return BeamRings(rings, (np.maximum(inwards[:, :-1], inwards[:, 1:]) > gap)[drawn], cone)
-
-
-def _rosette_lines(model: LidarModel, place: Float, axes: Float, ground: float, resolved: float) -> BeamRings:
-    """Return the line that a rosette draws on a flat road, and its rim; see `beam_rings`."""
-    hits, meets = _on_road(model, place, BeamPattern(model).directions(np.arange(model.channels)) @ axes.T, ground)
-    drawn = meets[:-1] & meets[1:]
-    line = np.stack([hits[:-1], hits[1:]], axis=1)[drawn]
-    wide = np.hypot(*(line[:, 1, :2] - place[:2]).T) > resolved
-    turn = np.arange(RIM_BEAMS) * (math.tau / RIM_BEAMS)
-    along, aside = math.cos(model.field_of_view / 2), math.sin(model.field_of_view / 2)
-    rim = np.column_stack([np.full(RIM_BEAMS, along), aside * np.cos(turn), aside * np.sin(turn)]) @ axes.T
-    ends, met = _on_road(model, place, rim, ground)
-    ends = np.where(met[:, None], ends, place + model.max_range * rim)
-    return BeamRings(line, wide, np.stack([np.broadcast_to(place, ends.shape), ends], axis=1))
 
 
 def _on_road(model: LidarModel, place: Float, beams: Float, ground: float) -> tuple[Float, Boolean]:

@@ -19,7 +19,7 @@ from ...base.errors import SeipError
 from ...base.progress import Progress
 from ..lidar.model import LidarModel
 from .ray_grid import RayGrid, recovered_rays
-from .sensor_recording import SensorRecording
+from .recording import SensorRecording
 
 LEAST_SWEEPS = 5
 """Sweeps below which standing and moving things cannot be told apart."""

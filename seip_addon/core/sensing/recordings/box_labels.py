@@ -1,11 +1,10 @@
-"""Labelled boxes of a sweep, in the formats of KITTI, OpenPCDet, OpenLABEL and DAIR-V2X."""
+"""Labelled boxes of a sweep, in the formats of KITTI and OpenPCDet."""
 
 from __future__ import annotations
 
-import math
 import re
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,13 +14,12 @@ import numpy as np
 from ...base.arrays import Float, Text
 from ...base.errors import SeipError
 from ...base.limits import ROAD_USER_SIZE, SENSOR_COORDINATE, UNWRAPPED_ANGLE, Limits
-from ...geometry.orientation import quaternion_rotation
 from ...storage.array_file import READ_ERRORS
-from ...storage.files import content_fault, parse_json, read_small
+from ...storage.files import content_fault, read_small
 from ..traffic.trajectories import CATEGORIES
 
 _MAX_BYTES = 1 << 26
-_CURE = "give the labels of one sweep as KITTI, OpenPCDet, OpenLABEL or DAIR-V2X have them"
+_CURE = "give the labels of one sweep as KITTI or OpenPCDet have them"
 
 _CATEGORY = {
     **{category: category for category in CATEGORIES},
@@ -44,7 +42,7 @@ class BoxLabels:
     ----------
     boxes : (k, 7) float64
         x, y, z of the middle, length, width, height (metres), and yaw in [-π, π) counter-clockwise from +x (radians),
-        in the sensor's axes, or in those of the coordinate system of an OpenLABEL file.
+        in the axes of the file.
     category : (k,) str
         One of `CATEGORIES` for each box.
     ignored : dict of str to int
@@ -102,9 +100,6 @@ def _labels(boxes: Iterable[_Box]) -> BoxLabels:
 
 
 def _boxes(text: str) -> Iterator[_Box]:
-    if text.lstrip().startswith(("{", "[")):
-        content = parse_json(text)
-        return _of_openlabel(content["openlabel"]) if isinstance(content, dict) else map(_of_dair, content)
     lines = [line.split() for line in text.splitlines() if line.strip()]
     return map(_of_openpcdet if lines and len(lines[0]) < 15 else _of_kitti, lines)
 
@@ -122,31 +117,3 @@ def _of_openpcdet(words: list[str]) -> _Box:
     if not 8 <= len(words) <= 9:
         raise ValueError(f"a line has {len(words)} columns, not 8")
     return words[7], list(words[:7])
-
-
-def _of_dair(box: dict[str, Any]) -> _Box:
-    size, place = box["3d_dimensions"], box["3d_location"]
-    return str(box["type"]), [*(place[axis] for axis in "xyz"), *(size[side] for side in "lwh"), box["rotation"]]
-
-
-def _of_openlabel(content: dict[str, Any]) -> Iterator[_Box]:
-    frames = content.get("frames", {})
-    if len(frames) != 1:
-        raise ValueError(f"it has {len(frames)} frames, not one")
-    for key, frame_object in next(iter(frames.values())).get("objects", {}).items():
-        data = frame_object["object_data"]
-        cuboids = data.get("cuboid", [])
-        kind = data.get("type") or content.get("objects", {})[key]["type"]
-        for cuboid in [cuboids] if isinstance(cuboids, dict) else cuboids:
-            x, y, z, *rotation, length, width, height = (float(number) for number in cuboid["val"])
-            yield str(kind), [x, y, z, length, width, height, _yaw_of(rotation)]
-
-
-def _yaw_of(rotation: Sequence[float]) -> float:
-    """Return the heading of an OpenLABEL cuboid: from a quaternion x y z w, or from Euler angles about x, y and z."""
-    if len(rotation) == 4:
-        turn = quaternion_rotation(np.roll(rotation, 1))
-        return float(np.arctan2(turn[1, 0], turn[0, 0]))
-    if len(rotation) == 3:  # radians; x is turned first, z last
-        return rotation[2] if math.cos(rotation[1]) >= 0.0 else rotation[2] + math.pi
-    raise ValueError(f"a cuboid has {len(rotation) + 6} numbers, not 10 with a quaternion or 9 with Euler angles")

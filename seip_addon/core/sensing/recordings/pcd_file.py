@@ -1,4 +1,4 @@
-"""Reader of Point Cloud Data files: ASCII, binary and compressed.
+"""Reader of Point Cloud Data files: ASCII and binary.
 
 Source: Point Cloud Library, "The PCD (Point Cloud Data) file format", version 0.7.
 """
@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 import re
-import struct
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -20,7 +19,6 @@ from ...geometry.orientation import quaternion_rotation
 
 _MAX_HEADER_BYTES = 1 << 16
 _MAX_POINT_BYTES = 1 << 12
-_MAX_LZF_RATIO = 88  # a reference of three bytes stands for 264 bytes
 _TYPES = {*("F4", "F8"), *(f"{kind}{size}" for kind in "IU" for size in (1, 2, 4, 8))}
 _HEADER_END = re.compile(rb"^DATA[ \t]+(ascii|binary|binary_compressed)[ \t]*\r?\n", re.MULTILINE)
 
@@ -47,13 +45,13 @@ def read_pcd(content: bytes) -> tuple[dict[str, NDArray[Any]], Float | None]:
     body = content[end.end() :]
     if end[1] == b"ascii":
         fields = _ascii_fields(body, point, count)
-    elif end[1] == b"binary":
+    elif end[1] == b"binary_compressed":
+        raise ValueError("it is compressed; write it as binary, with pcl_convert_pcd_ascii_binary IN OUT 1")
+    else:
         if len(body) != count * point.itemsize:
             raise ValueError(f"it announces {count:,} points of {point.itemsize} bytes in {len(body):,} bytes")
         points = np.frombuffer(body, point)
         fields = [points[name] for name in point.names or ()]
-    else:
-        fields = _compressed_fields(body, point, count)
     named = zip(header["FIELDS"], fields, strict=True)
     return {name.lower(): values for name, values in named if values.ndim == 1}, _viewpoint(header)
 
@@ -110,59 +108,3 @@ def number_table(text: str, delimiter: str | None, columns: Sequence[int]) -> Fl
     if not text.strip():  # NumPy would warn
         return np.empty((0, len(columns)))
     return np.loadtxt(text.splitlines(), delimiter=delimiter, comments=None, ndmin=2, usecols=columns)
-
-
-def _compressed_fields(body: bytes, point: np.dtype[Any], count: int) -> list[NDArray[Any]]:
-    """Return the fields of a compressed body, in which all values of a field stand together."""
-    packed, unpacked = struct.unpack_from("<II", body.ljust(8, b"\xff"))
-    size = count * point.itemsize
-    if packed > len(body) - 8 or unpacked != size or size > _MAX_LZF_RATIO * packed:
-        raise ValueError(f"it announces {packed:,} bytes for {count:,} points in {len(body):,} compressed bytes")
-    content = body[8 : 8 + packed]
-    try:
-        content = lzf_decompressed(content, size)
-    except ValueError:
-        if packed != size:  # some writers store bytes that LZF does not make shorter
-            raise
-    kinds = [point[name] for name in point.names or ()]
-    parts = np.split(np.frombuffer(content, np.uint8), np.cumsum([count * kind.itemsize for kind in kinds])[:-1])
-    return [part.view(kind.base).reshape(count, *kind.shape) for part, kind in zip(parts, kinds, strict=True)]
-
-
-def lzf_decompressed(packed: bytes, size: int) -> bytes:
-    """Return the ``size`` bytes that LZF has compressed.
-
-    A control byte below 32 precedes that number of literal bytes, and one more. All others are references: three bits
-    of length (7: another byte follows) and 13 bits of distance. Source: M. Lehmann, LibLZF, ``lzf_d.c``.
-
-    Raises
-    ------
-    ValueError
-        The compressed bytes are damaged.
-    """
-    result, at = bytearray(), 0
-    try:
-        while at < len(packed) and len(result) <= size:
-            control = packed[at]
-            at += 1
-            if control < 32:
-                result += packed[at : at + control + 1]
-                at += control + 1
-                continue
-            length = control >> 5
-            if length == 7:
-                length += packed[at]
-                at += 1
-            length += 2
-            begin = len(result) - ((control & 31) << 8) - packed[at] - 1
-            at += 1
-            if begin < 0:
-                raise ValueError("its compressed bytes refer to bytes before their beginning")
-            part = result[begin : begin + length]
-            # a reference may overlap with what it appends: then the bytes between repeat
-            result += part if len(part) == length else (part * (length // len(part) + 1))[:length]
-    except IndexError as error:
-        raise ValueError("its compressed bytes end too early") from error
-    if len(result) != size or at != len(packed):
-        raise ValueError(f"its compressed bytes do not stand for {size:,} bytes")
-    return bytes(result)

@@ -96,8 +96,6 @@ def recovered_rays(sweeps: Sequence[NDArray[np.float32]], model: LidarModel, nam
         There are too few points, they lie on no rings, the rings are not those of the model, or their azimuths are of
         more than one revolution.
     """
-    if model.rosette is not None:
-        raise SeipError(f"{name}: {model.name} has no fixed rays, so its background cannot be learned ray by ray")
     # Files round coordinates, which turns the directions of near points most.
     sweeps = [points[np.linalg.norm(points, axis=1) >= _LEAST_RANGE] for points in sweeps]
     azimuth, elevation = _angles(np.concatenate(sweeps))

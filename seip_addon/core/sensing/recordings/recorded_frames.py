@@ -24,9 +24,8 @@ from .background import Background, learn_background
 from .box_labels import BoxLabels
 from .comparison import MOST_VEHICLE_HEIGHT, NEARER, RayComparison, compare_rays
 from .ground import estimated_ground, pose_above_ground
-from .recording import Recording, paired
+from .recording import Recording, SensorRecording, paired
 from .registration import register
-from .sensor_recording import SensorRecording
 from .sweep import Sweep
 
 ROAD_REFLECTIVITY = 0.17

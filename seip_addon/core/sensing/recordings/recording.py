@@ -1,10 +1,10 @@
-"""Recordings: folders of sweeps, or packets of Ouster sensors, of one or several sensors."""
+"""Recordings: folders of sweeps of one or several sensors."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -14,9 +14,8 @@ from ...base.arrays import Float, Integer
 from ...base.errors import SeipError
 from ...base.limits import FRAMES, ROTATION_RATE, TIME
 from ...storage.files import natural_order, read_small
-from .ouster_file import open_ouster
-from .sensor_recording import SensorRecording
-from .sweep_files import sweep_suffix
+from .sweep import Sweep
+from .sweep_files import read_sweep, sweep_suffix
 
 MERGED = "merged"  # folder of the clouds of all sensors together, in datasets of `seip simulate --format pcd`
 TIMES_FILE = "timestamps.txt"
@@ -26,6 +25,38 @@ _UNIX_TIME = re.compile(
     r"(?<![0-9])(?:([0-9]{10})(?:\.([0-9]{1,9})|_([0-9]{9}))|([0-9]{13}|[0-9]{16}|[0-9]{19}))(?![0-9])"
 )
 """Unix time in a file name: seconds with decimals, seconds_nanoseconds, or milli-, micro- or nanoseconds."""
+
+
+@dataclass(frozen=True, eq=False)
+class SensorRecording:
+    """Sweeps of one sensor in order of time; each is read when it is asked for.
+
+    Parameters
+    ----------
+    name : str
+        Name of the sensor.
+    paths : tuple of Path
+        File of each sweep.
+    times : (m,) float64, seconds
+        Time of each sweep, strictly increasing.
+    """
+
+    name: str
+    paths: tuple[Path, ...]
+    times: Float
+
+    def __len__(self) -> int:
+        return len(self.times)
+
+    def sweep(self, number: int) -> Sweep:
+        """Read a sweep.
+
+        Raises
+        ------
+        SeipError
+            Its file is damaged.
+        """
+        return replace(read_sweep(self.paths[number]), time=float(self.times[number]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,8 +78,8 @@ class Recording:
 def open_recording(path: Path, rate: float) -> Recording:
     """Open a recording without reading its sweeps.
 
-    A folder of sweeps, one sweep, or a pcap of an Ouster sensor is one sensor; a folder of folders is one sensor for
-    each sub-folder with sweeps, except `MERGED`. Times of sweeps are those of `TIMES_FILE` (on each line a number of
+    A folder of sweeps, or one sweep, is one sensor; a folder of folders is one sensor for each sub-folder with sweeps,
+    except `MERGED`. Times of sweeps are those of `TIMES_FILE` (on each line a number of
     seconds, or a time in ISO 8601), otherwise the Unix times in the names of the files, otherwise number / rate.
 
     Parameters
@@ -65,14 +96,16 @@ def open_recording(path: Path, rate: float) -> Recording:
     if not path.exists():
         raise SeipError(f"no such file or folder: {path}; check its path")
     if path.is_file():
-        return Recording(path.stem, (_sensor_of_file(path),))
+        if not sweep_suffix(path):
+            raise SeipError(f"{path.name} is not a recording: give a folder of sweeps, or a sweep")
+        return Recording(path.stem, (SensorRecording(path.stem, (path,), np.zeros(1)),))
     sweeps, folders = _content(path)
     if sweeps:
         return Recording(path.name, (_sensor(path.name, sweeps, rate),))
     found = {folder.name: _content(folder)[0] for folder in folders if folder.name.lower() != MERGED}
     sensors = tuple(_sensor(name, paths, rate) for name, paths in found.items() if paths)
     if not sensors:
-        raise SeipError(f"{path} has no sweeps: name a folder of .pcd, .bin or .npz files, or a .pcap")
+        raise SeipError(f"{path} has no sweeps: name a folder of .pcd, .bin or .npz files")
     return Recording(path.name, sensors)
 
 
@@ -85,14 +118,6 @@ def _content(folder: Path) -> tuple[list[Path], list[Path]]:
         raise SeipError(
             f"cannot read {folder}: {error.strerror or error}; check that it is a readable folder"
         ) from error
-
-
-def _sensor_of_file(path: Path) -> SensorRecording:
-    if path.suffix.lower() == ".pcap":
-        return open_ouster(path)
-    if not sweep_suffix(path):
-        raise SeipError(f"{path.name} is not a recording: give a folder of sweeps, a sweep, or a .pcap with its .json")
-    return SensorRecording(path.stem, (path,), np.zeros(1))
 
 
 def _sensor(name: str, paths: Sequence[Path], rate: float) -> SensorRecording:

@@ -13,7 +13,6 @@ from ...base.estimates import student_quantile
 from ...geometry.orientation import nearest_rotation
 from ..scans.scanner import ReflectiveSurface
 from ..scans.sensor import MountedSensor
-from .azimuth_sectors import sector_of
 from .background import Background
 
 MATCH = 0.3
@@ -156,6 +155,16 @@ def _covariance(fit: _Fit, sector: Integer) -> Float:
     clusters = len(np.unique(sector[used]))
     covariance: Float = bread @ (scores.T @ scores) @ bread * clusters / max(clusters - 1, 1)
     return covariance
+
+
+def sector_of(directions: Float, sectors: int) -> Integer:
+    """Return the sector of azimuth of each direction (n, 3), (n,) int64 from 0 to ``sectors`` - 1.
+
+    Intervals treat sectors as independent: neighbouring rays meet the same surfaces.
+    """
+    azimuth = np.arctan2(directions[:, 1], directions[:, 0])
+    sector: Integer = np.floor((azimuth + math.pi) / math.tau * sectors).astype(np.int64) % sectors
+    return sector
 
 
 def rotation_of(vector: Float) -> Float:

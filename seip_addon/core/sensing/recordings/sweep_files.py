@@ -1,4 +1,4 @@
-"""Readers of sweeps: PCD, KITTI's and nuScenes' binary files, and npz."""
+"""Readers of sweeps: PCD, KITTI's binary files, and npz."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _NAMES = {
 
 
 def sweep_suffix(path: Path) -> str:
-    """Return the suffix by which a file is a sweep, such as ``.pcd`` or ``.pcd.bin``, or ""."""
+    """Return the suffix by which a file is a sweep, such as ``.pcd``, or ""."""
     name = path.name.lower()
     return next((suffix for suffix in _READERS if name.endswith(suffix)), "")
 
@@ -38,9 +38,8 @@ def sweep_suffix(path: Path) -> str:
 def read_sweep(path: Path) -> Sweep:
     """Read a sweep in the format of the file's suffix.
 
-    ``.bin`` holds four to six float32 for each point, of which x, y, z and intensity are read (KITTI), and ``.pcd.bin``
-    five (nuScenes). Point clouds with named columns need ``x``, ``y`` and ``z``; the names of intensity are those of
-    `_NAMES`.
+    ``.bin`` holds four to six float32 for each point, of which x, y, z and intensity are read (KITTI). Point clouds
+    with named columns need ``x``, ``y`` and ``z``; the names of intensity are those of `_NAMES`.
 
     Raises
     ------
@@ -98,14 +97,6 @@ def _kitti(path: Path) -> tuple[Columns, None]:
     return dict(zip(("x", "y", "z", "intensity"), points.T, strict=False)), None
 
 
-def _nuscenes(path: Path) -> tuple[Columns, None]:
-    content = read_small(path, MAX_BYTES, _CURE)
-    if len(content) % 20:
-        raise ValueError(f"{len(content):,} bytes are not whole points of 5 float32")
-    points = np.frombuffer(content, "<f4").reshape(-1, 5)
-    return dict(zip(("x", "y", "z", "intensity"), points.T, strict=False)), None
-
-
 def _npz(path: Path) -> tuple[Columns, None]:
     arrays = read_npz(path, MAX_BYTES)
     if "points" in arrays:
@@ -124,7 +115,6 @@ def _npz(path: Path) -> tuple[Columns, None]:
 
 
 _READERS: dict[str, Callable[[Path], tuple[Columns, Float | None]]] = {
-    ".pcd.bin": _nuscenes,
     ".pcd": _pcd,
     ".bin": _kitti,
     ".npz": _npz,

@@ -3,28 +3,23 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from itertools import pairwise
+from collections.abc import Callable
 
 import numpy as np
 
-from ...base.arrays import Boolean, Float, Integer
+from ...base.arrays import Boolean, Float
 from ...base.estimates import student_quantile
 from ..lidar.carla_dropoff import CarlaDropoff
 from ..lidar.noisy_returns import return_chance
-from .azimuth_sectors import sector_of
 from .comparison import AGREES, NOTHING, RayComparison
-from .figures import Gain, ReturnShare
-
-RANGE_EDGES = (0.0, 10.0, 20.0, 30.0, 40.0, 60.0, 80.0, 120.0, 200.0)
-"""Edges of the ranges, in metres, for which shares of returns are given."""
+from .registration import sector_of
+from .verification import Gain
 
 _LEAST, _MOST = 0.02, 50.0  # gains that can be found
 _STEPS = 60  # of the bisection
 _STEP = 0.05  # of the logarithm of the gain, for derivatives
 _SECTORS = 12  # of azimuth
 _LEAST_RAYS = 500
-_LEAST_IN_BIN = 30
 
 
 def fitted_gain(one: RayComparison) -> Gain | None:
@@ -78,28 +73,6 @@ def _root(chance: Callable[[float], Float], returned: Float, weight: Float) -> f
         else:
             high = middle
     return (low + high) / 2
-
-
-def return_shares(one: RayComparison, gain: float, surfaces: Sequence[tuple[str, Integer]]) -> list[ReturnShare]:
-    """Return the shares of rays that return, by surface and range.
-
-    Parameters
-    ----------
-    surfaces : sequence of (str, (n,) int64)
-        Kind of surface, and its triangles.
-    """
-    rays = _comparable(one)
-    chance = return_chance(one.sensor.model, one.predicted, one.reflected)
-    fitted = return_chance(one.sensor.model.amplified(gain), one.predicted, one.reflected)
-    found = []
-    for name, triangles in surfaces:
-        own = rays & np.isin(one.triangle, triangles)
-        for low, high in pairwise(RANGE_EDGES):
-            some = own & (one.predicted >= low) & (one.predicted < high)
-            if some.sum() >= _LEAST_IN_BIN:
-                means = (float(values[some].mean()) for values in (chance, fitted, one.returned))
-                found.append(ReturnShare(name, low, high, int(some.sum()), *means))
-    return found
 
 
 def _comparable(one: RayComparison) -> Boolean:

@@ -6,9 +6,43 @@ from dataclasses import dataclass
 
 from ...site.scene_geometry import SceneGeometry
 from .comparison import Change, RayComparison
-from .figures import CoverageSteps, Gain, ReturnShare
 
 Triple = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Gain:
+    """Received power of a unit as a multiple of that in its model's law, with its 95 % interval."""
+
+    value: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class CoverageSteps:
+    """Coverage of the same targets, 0 to 1, from the plan to the recording.
+
+    Parameters
+    ----------
+    promised : float
+        Planned poses, the scene, and the models.
+    pose : float
+        The same with the fitted poses.
+    obstacles : float
+        The same with the corrected scene.
+    installed : float
+        The same with the gain of each unit: what the installation covers.
+    returned : float
+        Targets with a background return within δ in the share of sweeps that detection demands. It exceeds coverage
+        where the surface differs from place to place, because one bright spot within δ is enough.
+    """
+
+    promised: float
+    pose: float
+    obstacles: float
+    installed: float
+    returned: float
 
 
 @dataclass(frozen=True)
@@ -49,7 +83,6 @@ class InstalledSensor:
     match: float
     background: RecordedBackground
     gain: Gain | None
-    returns: tuple[ReturnShare, ...]
 
     @property
     def planned_m(self) -> tuple[float, ...]:

@@ -94,7 +94,7 @@ def expected_returns(
     cast : int
         Number of rays.
     """
-    if model.rosette is None and is_upright(orientation):
+    if is_upright(orientation):
         return upright_returns(caster, origin, yaw_of(orientation), model, users)
     return all_ray_returns(caster, origin, orientation, model, users)
 
@@ -111,8 +111,6 @@ def upright_returns(
     origin : (3,) float64, metres
     yaw : float, radians
         Direction of azimuth zero.
-    model : LidarModel
-        Sensor with channels, not with a rosette.
 
     Returns
     -------

@@ -4,23 +4,20 @@ from __future__ import annotations
 
 import os
 from collections.abc import Generator, Mapping
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...base.arrays import Integer
 from ...base.errors import SeipError
-from ...base.progress import Progress
+from ...base.progress import Progress, each_in_threads
 from ...site.site import Site
 from ...storage.array_file import ArrayFile
 from ...storage.files import digest
 from ...storage.source_digest import source_digest
 from ..lidar.catalogue import find_models
 from ..lidar.model import LidarModel
-from ..visibility.chunks import collect
 from ..visibility.ray_casting import engine_name, make_ray_caster
 from ..visibility.settings import Engine
 from .expected_returns import expected_returns
@@ -33,8 +30,6 @@ FILE = ArrayFile(
     "delete it and compute it again",
     {"returns": "f4"},
 )
-
-_POSES_AT_ONCE = 16
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,7 +79,6 @@ def returns_key(site: Site, users: RoadUsers, models: Mapping[str, LidarModel], 
     inputs.append(np.array([list(used).index(key) for key in candidates.sensor], dtype=np.int64))
     for model in used.values():
         inputs += [model.beams_key, repr(model.law), float(model.min_range), float(model.max_range)]
-        inputs += [] if model.rosette is None else ["rosette"]
     return digest(*inputs)
 
 
@@ -121,16 +115,13 @@ def compute_returns(
     candidates = site.candidates
     used = find_models(models, np.unique(candidates.sensor).tolist())
     returns = np.zeros((len(candidates), len(users)), dtype=np.float32)
-    chunks = np.split(np.arange(len(returns)), range(_POSES_AT_ONCE, len(returns), _POSES_AT_ONCE))
 
-    def compute(poses: Integer) -> None:
-        for pose in poses:
-            model = used[str(candidates.sensor[pose])]
-            origin, orientation = candidates.xyz[pose], candidates.orientation(int(pose))
-            returns[pose] = expected_returns(caster, origin, orientation, model, users)[0]
+    def compute(pose: int) -> None:
+        model, origin = used[str(candidates.sensor[pose])], candidates.xyz[pose]
+        returns[pose] = expected_returns(caster, origin, candidates.orientation(pose), model, users)[0]
 
-    with ThreadPoolExecutor(min(caster.threads, threads or caster.threads)) as pool:
-        yield from collect(chunks, lambda poses: pool.submit(compute, poses), {}, "returns from road users")
+    at_once = min(caster.threads, threads or caster.threads)
+    yield from each_in_threads(compute, range(len(candidates)), at_once, "returns from road users")
     return ReturnsGrid(returns, returns_key(site, users, used, name))
 
 

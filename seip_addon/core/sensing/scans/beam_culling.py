@@ -44,11 +44,7 @@ class BeamWindows:
         middle, half, near = _azimuths(points)
         hull, channel = self._channels_at(points, near)
         arc, first, count = steps_in_arcs(
-            middle[hull] - self._zero[channel],
-            half[hull],
-            np.full(len(hull), self._size),
-            np.full(len(hull), self._steps),
-            np.full(len(hull), self._all_round),
+            middle[hull] - self._zero[channel], half[hull], self._size, self._steps, all_round=self._all_round
         )
         # An arc may run over step 0 of an all-round channel: its steps wrap. The rows of a hull in a channel have no
         # step in common, so that no ray comes twice for a hull.

@@ -41,16 +41,6 @@ class Motion:
         """Whether the road user stands still for the whole revolution."""
         return len(self.delay) == 1
 
-    def same_as(self, other: Motion | None) -> bool:
-        """Return whether both stand still, at the same position and attitude."""
-        # exactly equal: cached hits are used again only where computing them again would give the same bits
-        if other is None or not (self.is_still and other.is_still):
-            return False
-        return all(
-            (one == two).all()
-            for one, two in ((self.position, other.position), (self.yaw, other.yaw), (self.pitch, other.pitch))
-        )
-
     def pose(self, delay: float) -> tuple[Float, float, float]:
         """Return position (3,), yaw and pitch at a delay in seconds."""
         position = np.array([np.interp(delay, self.delay, part) for part in self.position.T])
@@ -96,7 +86,7 @@ def _motion(trajectories: Trajectories, user: int, begin: float, duration: float
 
     position = np.stack([of(part) for part in trajectories.position.T], axis=1)
     yaw, pitch = of(trajectories.yaw), of(trajectories.pitch)
-    # Parked and waiting road users become still motions, whose hits the scanner can cache.
+    # parked and waiting road users become still motions, for which the scanner needs one transformation
     values = np.column_stack([position, yaw, pitch])
     if (values == values[0]).all():
         times, position, yaw, pitch = times[:1], position[:1], yaw[:1], pitch[:1]

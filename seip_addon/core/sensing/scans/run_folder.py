@@ -232,8 +232,6 @@ def _frame_record(number: int, frame: Frame) -> Record:
 def _sensor_record(sensor: MountedSensor) -> Record:
     law = {"model": sensor.model.law.model, **asdict(sensor.model.law)}
     model = {name: np.asarray(value).tolist() for name, value in _fields(sensor.model)} | {"law": law}
-    if sensor.model.rosette is not None:  # from which the angles of its rays follow
-        model |= {"elevations": [], "azimuth_offsets": [], "rosette": _listed(asdict(sensor.model.rosette))}
     return {
         "label": sensor.label,
         "sensor": sensor.model.key,
@@ -249,13 +247,10 @@ def _listed(record: Mapping[str, Any]) -> Record:
 
 
 def _fields(model: LidarModel) -> list[tuple[str, Any]]:
-    values = [(part.name, getattr(model, part.name)) for part in fields(model)]
-    return [(name, value) for name, value in values if name != "rosette" or value is not None]
+    return [(part.name, getattr(model, part.name)) for part in fields(model)]
 
 
 def _parts(model: LidarModel) -> list[Any]:
     """Return the figures of a model that scans depend on, without names and sources."""
     unused = {"name", "manufacturer", "source", "price_source", "assumed_beams", "assumed_law"}
-    return [
-        repr(value) if name in {"law", "rosette"} else value for name, value in _fields(model) if name not in unused
-    ]
+    return [repr(value) if name == "law" else value for name, value in _fields(model) if name not in unused]

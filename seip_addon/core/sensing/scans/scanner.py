@@ -7,7 +7,6 @@ through its bounding box. A ray ends at the nearest hit.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from copy import copy
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,7 +24,6 @@ from .sensor import MountedSensor
 _RAYS_AT_ONCE = 1 << 17  # bounds the memory of the static scan
 _MARGIN = 1e-3
 """Metres by which bounding boxes are larger than their contents: engines compute in float32."""
-_MAX_LEVEL_SLOPE = 1e-12  # replacing a smaller slope by this moves a ray by less than the margin at any range
 _CORNERS = np.array(np.meshgrid((0, 1), (0, 1), (0, 1), indexing="ij")).reshape(3, 8).T
 
 
@@ -85,33 +83,6 @@ class BodySurface(ReflectiveSurface):
         corners += (2 * _CORNERS - 1) * bulge
         placed: Float = motion.position[:, None] + corners @ motion.attitude.transpose(0, 2, 1)
         return placed.reshape(-1, 3)
-
-    def may_hit(self, origin: Float, directions: Float, reach: float) -> Boolean:
-        """Return which rays pass through the bounding box within a range, by its slabs (Kay and Kajiya 1986).
-
-        Parameters
-        ----------
-        origin : (3, 1) or (3, n) float64, metres
-            Start of the rays, in the road user's axes.
-        directions : (3, n) float64
-            Unit vectors in the road user's axes.
-        reach : float, metres
-            Range of the rays.
-
-        Returns
-        -------
-        (n,) bool
-            Whether each ray passes.
-        """
-        # A box is the intersection of three slabs. Along a ray each slab is an interval of distances; the ray passes
-        # the box if the three intervals have a distance in common, ahead of the sensor and within range. Arrays have
-        # the three axes first, so that each step is one pass over contiguous memory.
-        slowness = 1.0 / np.where(np.abs(directions) < _MAX_LEVEL_SLOPE, _MAX_LEVEL_SLOPE, directions)
-        one, other = (self.low[:, None] - origin) * slowness, (self.high[:, None] - origin) * slowness
-        enter = np.minimum(one, other).max(axis=0)
-        leave = np.maximum(one, other).min(axis=0)
-        passes: Boolean = (enter <= leave) & (leave >= 0.0) & (enter <= reach)
-        return passes
 
 
 @dataclass(frozen=True, eq=False)
@@ -205,28 +176,10 @@ class Scanner:
     """
 
     def __init__(self, sensor: MountedSensor, ground: ReflectiveSurface) -> None:
-        self.sensor, self._ground, self.threads = sensor, ground, ground.caster.threads
+        self.sensor, self.threads = sensor, ground.caster.threads
         self.delay = sensor.model.delay(np.arange(sensor.model.channels * sensor.model.azimuth_count))
         self._model = sensor.model
-        self._cast_at_ground()
-
-    def for_other_traffic(self) -> Scanner:
-        """Return a scanner of the same sensor that shares what was cast at the static scene, not at road users."""
-        other = copy(self)
-        other._still_hits = {}  # noqa: SLF001  # its own kind
-        return other
-
-    def aim(self, time: float) -> None:
-        """Set the rays to their directions in the frame that begins at a time in seconds; only a rosette's change."""
-        # the cached static scan is valid for one pattern only
-        model = self.sensor.model.at(time)
-        if model.rosette != self._model.rosette:
-            self._model = model
-            self._cast_at_ground()
-
-    def _cast_at_ground(self) -> None:
-        """Cast all rays against the static scene, and keep the result for all frames of this pattern."""
-        sensor, rays = self.sensor, np.arange(len(self.delay))
+        rays = np.arange(len(self.delay))
         self._windows = BeamWindows(self._model)
         self.directions: Float = BeamPattern(self._model).directions(rays) @ sensor.orientation.T
         self.coarse_directions: NDArray[np.float32] = self.directions.astype(np.float32)
@@ -235,11 +188,9 @@ class Scanner:
         self._chance = np.zeros(len(rays), dtype=np.float32)
         for begin in range(0, len(rays), _RAYS_AT_ONCE):
             part = slice(begin, begin + _RAYS_AT_ONCE)
-            hits = self._cast(self._ground, sensor.xyz, self.directions[part], rays[part])
+            hits = self._cast(ground, sensor.xyz, self.directions[part], rays[part])
             self._distance[hits.ray], self._chance[hits.ray] = hits.distance, hits.chance
             self._intensity[hits.ray] = self._model.law.intensity(hits.distance, hits.reflected)
-        # stationary road users were hit by the rays of the earlier pattern: these hits are no longer valid
-        self._still_hits: dict[int, tuple[Motion, _Hits]] = {}
 
     @property
     def sees_nothing(self) -> bool:
@@ -269,21 +220,14 @@ class Scanner:
         return (distance >= self._model.min_range) & (distance <= self._model.max_range)
 
     def _hits(self, traffic: MovingTraffic) -> Iterator[tuple[Motion, _Hits]]:
-        """Yield each road user's hits, ignoring the rest of the scene; those of stationary ones are cached."""
-        # The cache holds the road users of the last revolution only, so that it does not grow with the run.
-        cached, self._still_hits = self._still_hits, {}
+        """Yield each road user's hits, ignoring the rest of the scene."""
         if not traffic.motions:
             return
         # the rays towards all hulls at once; they come sorted by hull, so that each road user's rays are one slice
         hull, ray = self._windows.rays_towards((traffic.hulls - self.sensor.xyz) @ self.sensor.orientation)
         first = np.searchsorted(hull, np.arange(len(traffic.motions) + 1))
         for number, (motion, shape) in enumerate(zip(traffic.motions, traffic.shapes, strict=True)):
-            before, hits = cached.get(motion.user, (None, None))
-            if hits is None or not motion.same_as(before):
-                hits = self._cast_at(shape, motion, ray[first[number] : first[number + 1]])
-            if motion.is_still:
-                self._still_hits[motion.user] = motion, hits
-            yield motion, hits
+            yield motion, self._cast_at(shape, motion, ray[first[number] : first[number + 1]])
 
     def _cast_at(self, shape: BodySurface, motion: Motion, ray: Integer) -> _Hits:
         """Cast rays against one road user, in its axes."""
@@ -293,16 +237,13 @@ class Scanner:
         # points are sheared as those of a spinning sensor are.
         directions = self.directions.take(ray, axis=0)
         if motion.is_still:
-            origin = motion.attitude[0].T @ (self.sensor.xyz - motion.position[0])[:, None]
-            directions = motion.attitude[0].T @ directions.T
+            start = (motion.attitude[0].T @ (self.sensor.xyz - motion.position[0])[:, None])[:, 0]
+            directions = (motion.attitude[0].T @ directions.T).T
         else:
             position, attitude = motion.at(self.delay[ray])
-            origin = np.einsum("ni,nij->jn", self.sensor.xyz - position, attitude)
-            directions = np.einsum("ni,nij->jn", directions, attitude)
-        # the hull covers the whole revolution; the box at each ray's own time is much smaller
-        passing = np.flatnonzero(shape.may_hit(origin, directions, self._model.max_range))
-        start = origin[:, 0] if motion.is_still else origin[:, passing].T
-        return self._cast(shape, start, directions[:, passing].T, ray[passing])
+            start = np.einsum("ni,nij->nj", self.sensor.xyz - position, attitude)
+            directions = np.einsum("ni,nij->nj", directions, attitude)
+        return self._cast(shape, start, directions, ray)
 
     def _cast(self, surface: ReflectiveSurface, origin: Float, directions: Float, ray: Integer) -> _Hits:
         """Cast rays at a surface in its axes."""

@@ -121,8 +121,6 @@ class Simulation:
 
     def measure(self, number: int, snapshot: Snapshot, scans: Sequence[Scan]) -> Frame:
         """Return the frame of scans at an instant, with noise, lost returns and labels."""
-        for scanner in self.scanners:
-            scanner.aim(snapshot.time)
         parts = [
             _returns(scanner, scan, sensor, self._random(sensor, number), rolling=self._settings.rolling_shutter)
             for sensor, (scanner, scan) in enumerate(zip(self.scanners, scans, strict=True))
@@ -137,13 +135,8 @@ class Simulation:
         """Return the scan of each sensor, without noise and lost returns."""
         motions = self._motions(snapshot)
         traffic = MovingTraffic.of(motions, [self._shapes[motion.user] for motion in motions])
-
-        def scan(scanner: Scanner) -> Scan:
-            scanner.aim(snapshot.time)
-            return scanner.scan(traffic, len(self._trajectories))
-
         with ThreadPoolExecutor(min(len(self.scanners), self._threads)) as pool:
-            return list(pool.map(scan, self.scanners))
+            return list(pool.map(lambda scanner: scanner.scan(traffic, len(self._trajectories)), self.scanners))
 
     def _motions(self, snapshot: Snapshot) -> list[Motion]:
         rolling = self._settings.rolling_shutter

@@ -2,18 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...base.arrays import Boolean, Integer
-from ...base.progress import Progress
-
-T = TypeVar("T")
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,16 +40,3 @@ class ScenarioVisibility:
         """Return the targets that at least one of some poses sees in each scenario, (n, t) bool."""
         joined = np.bitwise_or.reduce(self.packed[:, poses], axis=1)
         return np.unpackbits(joined, axis=1, count=self.targets).view(bool)
-
-
-def each_in_threads(
-    compute: Callable[[T], None], items: Sequence[T], threads: int, message: str
-) -> Generator[Progress, None, None]:
-    """Call a function for each item, several at once; closing the generator cancels calls that have not started."""
-    pool = ThreadPoolExecutor(threads)
-    try:
-        for done, _ in enumerate(pool.map(compute, items)):
-            yield Progress(done, len(items), message)
-    finally:
-        pool.shutdown(cancel_futures=True)
-    yield Progress(len(items), len(items), message)

@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...base.arrays import Boolean, Float, Integer, concatenated_ranges
-from ...base.progress import Progress
+from ...base.progress import Progress, each_in_threads
 from ..lidar.beams import BeamPattern
 from ..scans.beam_culling import BeamWindows
 from ..scans.sensor import level_orientation
@@ -25,7 +25,7 @@ from ..visibility.ray_casting import RayCaster, engine_name, make_ray_caster
 from ..visibility.scanning import ScanPosition
 from ..visibility.surroundings import Surroundings
 from ..visibility.target_index import TargetIndex
-from .scenario_visibility import ScenarioVisibility, each_in_threads
+from .scenario_visibility import ScenarioVisibility
 from .traffic_instants import TrafficObstacles
 
 _RAYS_AT_ONCE = 1 << 17  # bounds the memory of a full scan
@@ -108,7 +108,7 @@ class _StaticScan:
         candidates, delta = around.site.candidates, around.sight.delta
         self._model = model = around.models[str(candidates.sensor[pose])]
         xyz, yaw = candidates.xyz[pose], float(candidates.yaw[pose])
-        position = ScanPosition(caster, xyz, yaw, [model], around.sight, around.site.reflectivity)
+        position = ScanPosition(caster, xyz, yaw, model, around.sight, around.site.reflectivity)
         if candidates.tilt[pose] != 0:  # computed in the axes of the sensor, as visibility on the empty road is
             orientation = candidates.orientation(pose)
             position, surfaces = position.in_sensor_axes(orientation), rotated_surfaces(surfaces, xyz, orientation)
@@ -130,7 +130,7 @@ class _StaticScan:
         pairs = []
         for ray in np.array_split(matters, max(1, -(-len(matters) // _RAYS_AT_ONCE))):
             directions = self._pattern.directions(ray)
-            distance, triangle = position.cast(directions, model.max_range)
+            distance, triangle = position.cast(directions)
             self._distance[ray] = distance
             pairs.append(self._seen_by(position, ray, directions, distance, triangle))
         self._target = np.concatenate([target for _, target in pairs]).astype(np.int32)
@@ -149,7 +149,7 @@ class _StaticScan:
         ray = np.flatnonzero(towards & self._matters)
         directions = self._pattern.directions(ray)
         present = replace(self._position, caster=vehicles.caster, reflectivity=vehicles.reflectivity)
-        distance, triangle = present.cast(directions, self._model.max_range)
+        distance, triangle = present.cast(directions)
         sooner = distance < self._distance[ray]
         stopped = ray[sooner]
         # A road user that stops a ray takes it away from all targets of its list. A target stays seen if more rays see
@@ -171,5 +171,5 @@ class _StaticScan:
         self, position: ScanPosition, ray: Integer, directions: Float, distance: Float, triangle: Integer
     ) -> tuple[Integer, Integer]:
         """Return pairs of rays and the targets that their returns see, in the order of the rays."""
-        which, target = position.pairs_seen(self._model, directions, distance, triangle, self._surfaces, self._index)
+        which, target = position.pairs_seen(directions, distance, triangle, self._surfaces, self._index)
         return ray[which], target

@@ -5,20 +5,19 @@ from collections.abc import Generator
 import numpy as np
 
 from ...base.arrays import Integer
-from ...base.progress import Progress
+from ...base.progress import Progress, each_in_threads
 from ...geometry.orientation import orientations
-from ..visibility.chunks import sharing_rays
 from ..visibility.ray_casting import engine_name, make_ray_caster
 from ..visibility.surroundings import Surroundings
 from ..visibility.visibility_model import VisibilityModel
 from .pose_errors import PoseErrors, draw_errors, out_of_objects
-from .scenario_visibility import ScenarioVisibility, each_in_threads
+from .scenario_visibility import ScenarioVisibility
 
 
 def visibility_under_errors(
     around: Surroundings, poses: Integer, errors: PoseErrors, draws: int, seed: int
 ) -> Generator[Progress, None, ScenarioVisibility]:
-    """Compute visibility from poses under draws of errors; sensors of several types at one position share rays.
+    """Compute visibility from poses under draws of errors.
 
     No draw puts a sensor inside an object; see `out_of_objects`.
 
@@ -32,7 +31,7 @@ def visibility_under_errors(
     Yields
     ------
     Progress
-        Progress after each position of a draw.
+        Progress after each pose of a draw.
     """
     site, models = around.site, around.models
     candidates = site.candidates
@@ -40,19 +39,16 @@ def visibility_under_errors(
     yaw, tilt = candidates.yaw[poses], candidates.tilt[poses]
     caster = make_ray_caster(site.triangles, engine_name(around.engine))
     model = VisibilityModel(site.targets.xyz, site.reflectivity, around.sight, caster)
-    together = sharing_rays(xyz, yaw, tilt)
     packed = np.zeros((draws, len(poses), (len(site.targets) + 7) // 8), dtype=np.uint8)
     drawn = draw_errors(errors, candidates.position[candidates.position_of[poses]], draws, seed)
     drawn = out_of_objects(drawn, xyz, around.objects)
     rotations = orientations(yaw + drawn[..., 3], tilt + drawn[..., 4], drawn[..., 5])
 
-    def compute(work: tuple[int, Integer]) -> None:
-        draw, members = work
-        first = members[0]
-        where, rotated = xyz[first] + drawn[draw, first, :3], rotations[draw, first]
-        seen, _ = model.see_all([models[keys[member]] for member in members], where, rotated)
-        packed[draw, members] = np.packbits(seen, axis=1)
+    def compute(work: tuple[int, int]) -> None:
+        draw, pose = work
+        seen = model.see(models[keys[pose]], xyz[pose] + drawn[draw, pose, :3], rotations[draw, pose])
+        packed[draw, pose] = np.packbits(seen)
 
-    works = [(draw, members) for draw in range(draws) for members in together]
+    works = [(draw, pose) for draw in range(draws) for pose in range(len(poses))]
     yield from each_in_threads(compute, works, caster.threads, "computing visibility under pose errors")
     return ScenarioVisibility(packed, len(site.targets))

@@ -135,7 +135,7 @@ def _models(category: str) -> list[tuple[Float, Text]]:
 
 
 def read_mesh(path: Path) -> tuple[Float, Text]:
-    """Read the mesh of a body from a Wavefront OBJ file.
+    """Read the mesh of a body from a Wavefront OBJ file of triangles.
 
     Returns
     -------
@@ -143,35 +143,18 @@ def read_mesh(path: Path) -> tuple[Float, Text]:
         Corners of the triangles.
     material : (n,) str
         Material of each triangle.
-
-    Raises
-    ------
-    SeipError
-        The file is not a mesh of triangles with a length, width and height, or has an unknown material.
     """
     vertices: list[list[float]] = []
     faces: list[list[int]] = []
     material: list[str] = []
     name = ""
-    try:
-        for line in path.read_text(encoding="utf-8").splitlines():
-            match line.split():
-                case ["v", x, y, z, *_]:
-                    vertices.append([float(x), float(y), float(z)])
-                case ["usemtl", name]:
-                    name = name.replace("_", " ")
-                case ["f", *corners]:
-                    faces.append([int(corner.split("/")[0]) - 1 for corner in corners])
-                    material.append(name)
-        if not all(len(set(face)) == 3 and min(face) >= 0 for face in faces):
-            raise SeipError(f"{path.name}: not all faces are triangles; export it triangulated")
-        triangles = np.array(vertices)[np.array(faces)]
-    except (OSError, ValueError, IndexError) as error:
-        raise SeipError(f"{path.name} is not a Wavefront OBJ mesh ({error}); export it again") from error
-    if not (np.isfinite(triangles).all() and np.ptp(triangles, axis=(0, 1)).min() > 0.0):
-        raise SeipError(f"{path.name} has no length, width and height; correct its vertices")
-    unknown = set(material) - REFLECTIVITY.keys() - set(PAINTED_MATERIALS)
-    if unknown:
-        known = ", ".join(sorted({*REFLECTIVITY, *PAINTED_MATERIALS}))
-        raise SeipError(f"{path.name}: unknown material {min(unknown)!r}; known are {known}")
-    return triangles, np.array(material)
+    for line in path.read_text(encoding="utf-8").splitlines():
+        match line.split():
+            case ["v", x, y, z, *_]:
+                vertices.append([float(x), float(y), float(z)])
+            case ["usemtl", name]:
+                name = name.replace("_", " ")
+            case ["f", *corners]:
+                faces.append([int(corner.split("/")[0]) - 1 for corner in corners])
+                material.append(name)
+    return np.array(vertices)[np.array(faces)], np.array(material)

@@ -5,8 +5,6 @@ are those of the network: the map's plus the network's offset (SUMO's documentat
 is taken as the person's centre, as SUMO draws it.
 """
 
-import csv
-import io
 import math
 import os
 from array import array
@@ -20,16 +18,14 @@ import numpy as np
 from ...base.arrays import Boolean, Float, Integer
 from ...base.counts import counted
 from ...base.errors import SeipError
-from ...base.limits import LATITUDE, LONGITUDE, MAP_COORDINATE, SPEED, TIME
+from ...base.limits import MAP_COORDINATE, SPEED, TIME
 from ...base.progress import Progress
 from ...storage.files import digest
-from ...storage.xml_stream import Attributes, opened, quoted, read_tags, short
+from ...storage.xml_stream import Attributes, quoted, read_tags, short
 from .trajectories import RoadUser, Trajectories
 from .vehicle_types import CAR, PERSON, VehicleType
 
 _MAX_NAMED = 5  # largest number of road users named in a message, which gives the number of the others
-_MIN_DRIVEN, _MOST_MOVED = 10.0, 1e-3  # metres by speed, and share of them in coordinates that are degrees
-_LINES_PER_REPORT = 20_000  # lines of csv between two reports of progress
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,8 +50,8 @@ class FloatingCarData:
         Speed at each sample.
     elsewhere : int
         Number of further road users in the file that are never within the bounds.
-    riders, containers : int
-        Number of persons in vehicles, and of containers, which are left out.
+    riders : int
+        Number of persons in vehicles, who are left out.
     """
 
     names: tuple[str, ...]
@@ -68,7 +64,6 @@ class FloatingCarData:
     speed: Float
     elsewhere: int = 0
     riders: int = 0
-    containers: int = 0
 
 
 class Extent(NamedTuple):
@@ -86,12 +81,10 @@ class Extent(NamedTuple):
 def read_floating_car_data(
     path: str | os.PathLike[str], net_offset: Float | None = None, window: Extent | None = None
 ) -> Generator[Progress, None, FloatingCarData]:
-    """Read floating car data as XML or csv (with either of SUMO's column names), with or without gzip.
+    """Read floating car data as XML, with or without gzip.
 
     Parameters
     ----------
-    path : path-like
-        File that ends with ``.xml`` or ``.csv``, optionally followed by ``.gz``.
     net_offset : (2,) float64, metres, optional
         Offset of the network: map = network − offset.
     window : Extent, optional
@@ -103,11 +96,7 @@ def read_floating_car_data(
         The file cannot be read, has other contents or is incomplete, its times decrease, or a number is invalid.
     """
     rows = _Rows(Path(path).name, np.zeros(2) if net_offset is None else net_offset, window or Extent())
-    suffixes = [suffix.lower() for suffix in Path(path).suffixes if suffix.lower() != ".gz"]
-    if suffixes[-1:] == [".csv"]:
-        yield from _read_csv(path, rows)
-    else:
-        yield from read_tags(path, rows.take)
+    yield from read_tags(path, rows.take)
     return rows.gathered()
 
 
@@ -140,7 +129,8 @@ def read_trajectories(
     if not data.names:
         raise SeipError(
             f"FCD of another map, or of another time: none of the {data.elsewhere} road users in {source} comes near "
-            "the scene's road; simulate on the scene's own map, and name its .net.xml where that has a netOffset"
+            "the scene's road; simulate on the scene's own map, without --fcd-output.geo, and name its .net.xml where "
+            "that has a netOffset"
         )
     sizes = [
         types.get(name, PERSON if walks else CAR) for name, walks in zip(data.types, data.person.tolist(), strict=True)
@@ -212,8 +202,6 @@ class _Rows:
         self._vehicles_here: set[tuple[str, str]] = set()  # places of vehicles in this step, as the file writes them
         self._persons_here: list[tuple[str, tuple[str, str]]] = []
         self._riders: set[str] = set()
-        self._containers: set[str] = set()
-        self._degrees: _Degrees | None = _Degrees()  # until a coordinate is none of a place on the Earth
         self._user = array("q")
         self._columns = [array("d") for _ in range(6)]
 
@@ -223,8 +211,6 @@ class _Rows:
             self.begin(attributes.get("time", ""))
         elif tag in ("vehicle", "person") and self._steps:
             self.add(attributes, walks=tag == "person")
-        elif tag == "container":
-            self._containers.add(attributes.get("id", ""))
 
     def begin(self, text: str) -> None:
         """Begin a step of the simulation."""
@@ -255,8 +241,6 @@ class _Rows:
         name, place = row.get("id", ""), (row.get("x", ""), row.get("y", ""))
         x, y = (self._number(text, axis, name, MAP_COORDINATE.most) for text, axis in zip(place, "xy", strict=True))
         speed = self._number(row.get("speed") or "0", "speed", name, SPEED.most)
-        if self._degrees is not None and not self._degrees.add((name, walks), self._time, x, y, speed):
-            self._degrees = None
         x, y = x - self._shift_x, y - self._shift_y
         if walks:
             self._persons_here.append((name, place))
@@ -290,10 +274,6 @@ class _Rows:
                 f"{self._file} is not floating car data: it has no time steps; use the output of SUMO's --fcd-output"
             )
         self._note_riders()
-        if self._degrees is not None and self._degrees.are_likely:
-            raise SeipError(
-                f"{self._file}: x and y are degrees, not metres; simulate without --fcd-output.geo, or convert them"
-            )
         keys = [key for key in self._numbers if not (key[1] and key[0] in self._riders)]
         numbers = np.full(len(self._numbers), -1)
         numbers[np.array([self._numbers[key] for key in keys], dtype=np.int64)] = np.arange(len(keys))
@@ -322,7 +302,6 @@ class _Rows:
             speed=speed,
             elsewhere=len(self._outside.difference(self._numbers)),
             riders=len(self._numbers) - len(keys),
-            containers=len(self._containers),
         )
 
     def _number(self, text: str, what: str, where: str, most: float) -> float:
@@ -337,70 +316,6 @@ class _Rows:
                 f"{self._file}: {what}={quoted(text)} of {quoted(where)}{known} {fault}; write the file again"
             )
         return value
-
-
-class _Degrees:
-    """Whether coordinates may be degrees: road users move much less in them than their speeds say."""
-
-    def __init__(self) -> None:
-        self._last: dict[tuple[str, bool], tuple[float, float, float]] = {}
-        self._moved = self._driven = 0.0
-
-    def add(self, key: tuple[str, bool], time: float, x: float, y: float, speed: float) -> bool:
-        """Add a sample of a road user, and return whether its coordinates may be longitude and latitude."""
-        before, self._last[key] = self._last.get(key), (time, x, y)
-        if before is not None:
-            self._driven += speed * (time - before[0])
-            self._moved += math.hypot(x - before[1], y - before[2])
-        return LONGITUDE.allow(x) and LATITUDE.allow(y)
-
-    @property
-    def are_likely(self) -> bool:
-        """Whether the coordinates of all samples are degrees rather than metres."""
-        return self._driven > _MIN_DRIVEN and self._moved < _MOST_MOVED * self._driven
-
-
-def _read_csv(path: str | os.PathLike[str], rows: _Rows) -> Generator[Progress, None, None]:
-    with opened(path) as (stream, progress):
-        text = io.TextIOWrapper(stream, encoding="utf-8-sig", newline="")
-        try:
-            header = text.readline()
-            table = csv.reader(text, delimiter=";" if ";" in header else ",")
-            columns = next(csv.reader([header.strip()], delimiter=";" if ";" in header else ","), [])
-            if "timestep_time" not in columns:
-                raise SeipError(
-                    f"{Path(path).name} is not floating car data: it has no column timestep_time; "
-                    "use the output of SUMO's --fcd-output or of its xml2csv"
-                )
-            for number, cells in enumerate(table):
-                if len(cells) not in {0, len(columns)}:  # a blank line has none
-                    raise SeipError(
-                        f"{Path(path).name}: line {table.line_num + 1} has {len(cells)} cells under {len(columns)} "
-                        "columns; write the file again"
-                    )
-                if cells:
-                    _take_line(dict(zip(columns, cells, strict=True)), rows)
-                if number % _LINES_PER_REPORT == 0:
-                    yield progress()
-        except (UnicodeDecodeError, csv.Error) as error:
-            reason = error if isinstance(error, csv.Error) else "it is not in UTF-8"
-            raise SeipError(f"{Path(path).name} is not a csv table ({reason}); write it again") from error
-
-
-def _take_line(cells: Attributes, rows: _Rows) -> None:
-    """Read a line of the table: SUMO writes persons as vehicles without a lane, xml2csv in separate columns."""
-    rows.begin(cells["timestep_time"])
-    if cells.get("person_id"):
-        rows.add(_part(cells, "person_"), walks=True)
-    if cells.get("container_id"):
-        rows.take("container", _part(cells, "container_"))
-    if cells.get("vehicle_id"):
-        walks = bool(cells.get("vehicle_edge")) and not cells.get("vehicle_lane")
-        rows.add(_part(cells, "vehicle_"), walks=walks)
-
-
-def _part(cells: Attributes, prefix: str) -> Attributes:
-    return {name.removeprefix(prefix): cell for name, cell in cells.items() if name.startswith(prefix)}
 
 
 def _paint(name: str) -> float:
@@ -422,6 +337,5 @@ def _missing_sizes(unknown: list[str], count: int) -> tuple[str, ...]:
 
 
 def _left_out(data: FloatingCarData) -> tuple[str, ...]:
-    found = [(data.riders, "person in a vehicle", "persons in vehicles"), (data.containers, "container", "containers")]
-    named = [counted(number, one, several) for number, one, several in found if number]
-    return (f"left out: {' and '.join(named)}",) if named else ()
+    riders = counted(data.riders, "person in a vehicle", "persons in vehicles")
+    return (f"left out: {riders}",) if data.riders else ()

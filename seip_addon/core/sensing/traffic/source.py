@@ -17,7 +17,6 @@ from ...base.progress import Progress
 from ...site.scene_geometry import SceneGeometry, joined
 from ...storage.xml_stream import Attributes, read_tags
 from .floating_car_data import Extent, read_floating_car_data, read_trajectories
-from .overlaps import find_overlaps
 from .road_fit import fit_to_road
 from .site_traffic import load_trajectories
 from .trajectories import CATEGORIES, LoadedTraffic, Trajectories
@@ -25,7 +24,6 @@ from .vehicle_types import read_vehicle_types
 
 ROAD_MARGIN = 20.0  # metres beyond the road of the scene within which traffic is read
 _PLURAL = {"bus": "buses"}  # of categories, where it does not just add an "s"
-OVERLAP_INTERVAL = 1.0  # seconds between the instants that are searched for overlapping road users
 
 
 @dataclass(frozen=True)
@@ -74,8 +72,7 @@ def load_traffic(files: TrafficFiles, geometry: SceneGeometry) -> Generator[Prog
     )
     read = yield from read_sumo(files, window, geometry, files.path.name)
     fit = fit_to_road(read.trajectories, geometry)
-    overlaps = yield from overlap_warnings(fit.trajectories)
-    return LoadedTraffic(fit.trajectories, (*read.warnings, *fit.warnings, *overlaps))
+    return LoadedTraffic(fit.trajectories, (*read.warnings, *fit.warnings))
 
 
 def read_sumo(
@@ -96,17 +93,6 @@ def read_sumo(
     data = yield from read_floating_car_data(files.path, offset, window)
     types = yield from read_vehicle_types(files.routes)
     return LoadedTraffic(*read_trajectories(data, types, geometry.origin, source))
-
-
-def overlap_warnings(trajectories: Trajectories) -> Generator[Progress, None, tuple[str, ...]]:
-    """Return a warning if road users overlap."""
-    overlaps = yield from find_overlaps(trajectories, OVERLAP_INTERVAL)
-    if not len(overlaps):
-        return ()
-    worst = int(overlaps.area.argmax())
-    one, other = (trajectories.users[number].name for number in overlaps.pair[worst])
-    pairs = counted(len(overlaps), "pair of road users overlaps", "pairs of road users overlap")
-    return (f"{pairs}; {one} and {other} share {overlaps.area[worst]:.1f} m² at {overlaps.time[worst]:g} s",)
 
 
 def road_bounds(geometry: SceneGeometry, margin: float) -> tuple[float, float, float, float]:

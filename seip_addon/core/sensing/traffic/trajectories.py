@@ -16,8 +16,10 @@ from ...storage.array_file import ArrayFile
 from ...storage.files import digest
 
 WARM_UP = 2.0  # seconds from the first sample of a run to the first instant that is used
+MOST_DRIFT = 0.5  # largest movement of a parked road user along an axis during a run, metres
 MAX_BEND = 0.6  # largest bend of the lines of a body along one axis
 
+_TIME_TOLERANCE = 1e-6  # seconds
 _ARRAYS = {
     "origin": "f8",
     "first": "i8",
@@ -263,6 +265,22 @@ def some_users(trajectories: Trajectories, kept: Boolean) -> Trajectories:
         first=np.concatenate([[0], np.cumsum(counts[kept])]).astype(np.int64),
         **{name: getattr(trajectories, name)[samples] for name in SAMPLED},
     )
+
+
+def parked_users(trajectories: Trajectories) -> Boolean:
+    """Return which road users stand still from the first sample of a run to the last, (u,) bool.
+
+    Road users at a traffic light move before or after it, in runs that are longer than a red light.
+    """
+    begin, end = trajectories.span
+    first, last = trajectories.first[:-1], trajectories.first[1:] - 1
+    throughout = (trajectories.time[first] <= begin + _TIME_TOLERANCE) & (
+        trajectories.time[last] >= end - _TIME_TOLERANCE
+    )
+    highest = np.maximum.reduceat(trajectories.position, first, axis=0)
+    drift = (highest - np.minimum.reduceat(trajectories.position, first, axis=0)).max(axis=1)
+    stands: Boolean = throughout & (drift < MOST_DRIFT)
+    return stands
 
 
 def _look(user: RoadUser) -> tuple[object, ...]:

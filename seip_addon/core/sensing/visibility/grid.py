@@ -3,15 +3,16 @@
 V_ij = 1 if and only if a return of candidate i's full scan lies nearer than δ to target j and has at least the minimum
 intensity, if one is set.
 
-The result equals that of full scans, but only rays that can affect it are cast (`scanning`), against triangles that can
-affect it (`needed_triangles`).
+The result equals that of full scans, but only rays that can affect it are cast (`scanning`).
 """
 
 from __future__ import annotations
 
 import os
 from collections.abc import Generator, Mapping, Sequence
+from contextlib import closing
 from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -19,18 +20,17 @@ from numpy.typing import NDArray
 
 from ...base.arrays import Boolean, Float, Integer
 from ...base.errors import SeipError
-from ...base.progress import Progress
+from ...base.progress import Progress, each_in_threads
+from ...site.candidates import Candidates
 from ...site.site import Site
 from ...storage.array_file import ArrayFile
 from ...storage.files import digest
 from ...storage.source_digest import source_digest
 from ..lidar.catalogue import find_models
 from ..lidar.model import LidarModel
-from .chunks import Checkpoint, chunks_of, compute_chunks
-from .executors import VisibilityTask, dask_executor, thread_executor
-from .ray_casting import engine_name
+from .ray_casting import engine_name, make_ray_caster
 from .settings import Engine, VisibilitySettings
-from .triangle_culling import needed_triangles
+from .visibility_model import VisibilityModel
 
 FILE = ArrayFile(
     "seip.visibility",
@@ -39,6 +39,15 @@ FILE = ArrayFile(
     "delete it and compute it again",
     {"packed": "u1"},
 )
+PART = ArrayFile(
+    "seip.visibility-part",
+    1,
+    "part of a visibility grid",
+    "delete it and compute the grid again",
+    {"poses": "i8", "packed": "u1", "rays": "i8"},
+    compressed=False,
+)
+KEPT = 2_000  # poses after which those that are finished are written
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +63,7 @@ class VisibilityGrid:
     key : str
         Digest of all inputs; see `visibility_key`.
     parameters : dict
-        Provenance, for information: delta, min_intensity, detection, engine, sensors, numbers of rays and triangles.
+        Provenance, for information: delta, min_intensity, detection, engine, sensors, numbers of rays.
     """
 
     packed: NDArray[np.uint8]
@@ -131,20 +140,64 @@ def visibility_key(site: Site, models: Mapping[str, LidarModel], settings: Visib
         inputs += [model.elevations, model.azimuth_offsets, float(model.azimuth_count)]
         inputs += [float(model.min_range), float(model.max_range)]
         inputs += [] if model.all_round else [f"field of view {model.field_of_view!r}"]
-        inputs += [] if model.rosette is None else ["rosette"]
     if site.candidates.tilt.any():
         inputs.append(site.candidates.tilt)
     return digest(*inputs)
 
 
-def compute_visibility(  # noqa: PLR0913, PLR0917  # the inputs, and how to compute
+class Checkpoint:
+    """Finished rows of an incomplete grid, in a file next to that of the grid.
+
+    Parameters
+    ----------
+    path : path
+        File of the grid.
+    key : str
+        Key of the grid; a file with another one is ignored.
+    """
+
+    def __init__(self, path: Path, key: str) -> None:
+        self._path, self._key = path.with_name(f"{path.stem}.part.npz"), key
+
+    def restore(self, packed: NDArray[np.uint8], rays: Integer) -> Integer:
+        """Fill in the finished rows (c, ceil(t / 8)) and their numbers of rays (c,); return the poses of the others."""
+        left = np.arange(len(packed))
+        try:
+            with PART.reading(self._path) as (header, arrays):
+                poses = arrays["poses"]
+                if header["key"] != self._key or arrays["packed"].shape != (len(poses), packed.shape[1]):
+                    return left
+                packed[poses], rays[poses] = arrays["packed"], arrays["rays"]
+        except SeipError:  # there is none
+            return left
+        return np.setdiff1d(left, poses)
+
+    def save(self, poses: Integer, packed: NDArray[np.uint8], rays: Integer) -> None:
+        """Write the rows of finished poses."""
+        PART.save(self._path, {"key": self._key}, {"poses": poses, "packed": packed[poses], "rays": rays[poses]})
+
+    def remove(self) -> None:
+        """Remove the file once the grid is complete."""
+        self._path.unlink(missing_ok=True)
+
+
+def seen_from(
+    model: VisibilityModel, candidates: Candidates, models: Mapping[str, LidarModel], pose: int
+) -> tuple[Boolean, int]:
+    """Compute the targets that a candidate pose sees, and the number of rays; see `VisibilityModel.scan`."""
+    kind, xyz = models[str(candidates.sensor[pose])], candidates.xyz[pose]
+    if candidates.tilt[pose] == 0:
+        return model.scan_upright(kind, xyz, float(candidates.yaw[pose]))
+    return model.scan(kind, xyz, candidates.orientation(pose))
+
+
+def compute_visibility(
     site: Site,
     models: Mapping[str, LidarModel],
     settings: VisibilitySettings,
     engine: Engine = "auto",
-    checkpoint: Checkpoint | None = None,
-    scheduler: str | None = None,
     threads: int | None = None,
+    checkpoint: Checkpoint | None = None,
 ) -> Generator[Progress, None, VisibilityGrid]:
     """Compute the targets that each candidate pose sees, casting only rays that can affect the grid.
 
@@ -154,44 +207,105 @@ def compute_visibility(  # noqa: PLR0913, PLR0917  # the inputs, and how to comp
         Sensor types by catalogue key, those of all candidates included.
     engine : {"auto", "bvh", "embree"}
         Ray-casting engine.
-    checkpoint : Checkpoint, optional
-        Finished chunks of an interrupted run with the same key; chunks of this run are added.
-    scheduler : str, optional
-        Address of a Dask scheduler whose workers compute the chunks; by default this process does.
     threads : int, optional
-        Maximum number of threads in this process.
+        Maximum number of threads; by default the number that the ray caster can use.
+    checkpoint : Checkpoint, optional
+        Rows of an earlier computation that was ended; the rows of this one are kept there until it is complete.
 
     Yields
     ------
     Progress
-        Progress ten times a second, and after each chunk.
+        Progress after each pose.
 
     Returns
     -------
     VisibilityGrid
-        Identical to that of full scans, which cast every ray, wherever it is computed.
+        Identical to that of full scans, which cast every ray.
 
     Raises
     ------
     SeipError
-        A sensor is unknown, there are no poses or targets, a coordinate is not finite, or the engine or the scheduler
-        is not available.
+        A sensor is unknown, there are no poses or targets, a coordinate is not finite, or the engine is not available.
     """
     used = _used_models(site, models)
     _check_site(site)
-    longest = max(model.max_range for model in used.values())
-    needed = needed_triangles(site.triangles, site.candidates.xyz, site.targets.xyz, settings.delta, longest)
-    task = VisibilityTask(site, used, settings, engine_name(engine), needed.keep)
-    chunks = chunks_of(site)
-    with thread_executor(task, threads) if scheduler is None else dask_executor(task, scheduler) as submit:
-        rows = yield from compute_chunks(chunks, submit, checkpoint)
-    packed = np.zeros((len(site.candidates), (len(site.targets) + 7) // 8), dtype=np.uint8)
-    packed[np.concatenate(chunks)] = np.concatenate([row.packed for row in rows])
-    parameters = {"triangles": needed.counts, "rays_cast": sum(row.rays for row in rows)}
-    origin = {"engine": task.engine, "sensors": list(used), "rays_of_full_scan": _rays_of_full_scan(site, used)}
-    key = visibility_key(site, used, settings, task.engine)
-    shape = len(site.candidates), len(site.targets)
-    return VisibilityGrid(packed, shape, key, {**asdict(settings), **origin, **parameters})
+    name, candidates = engine_name(engine), site.candidates
+    caster = make_ray_caster(site.triangles, name)
+    model = VisibilityModel(site.targets.xyz, site.reflectivity, settings, caster)
+    packed = np.zeros((len(candidates), (len(site.targets) + 7) // 8), dtype=np.uint8)
+    rays = np.zeros(len(candidates), dtype=np.int64)
+
+    left = np.arange(len(candidates)) if checkpoint is None else checkpoint.restore(packed, rays)
+    finished = np.ones(len(candidates), dtype=bool)
+    finished[left] = False
+
+    def compute(pose: int) -> None:
+        seen, rays[pose] = seen_from(model, candidates, used, pose)
+        packed[pose] = np.packbits(seen)
+        finished[pose] = True
+
+    steps = each_in_threads(compute, left.tolist(), min(caster.threads, threads or caster.threads), "visibility")
+    yield from steps if checkpoint is None else _kept(steps, checkpoint, finished, packed, rays)
+    origin = {"engine": name, "sensors": list(used), "rays_of_full_scan": _rays_of_full_scan(site, used)}
+    parameters = {**asdict(settings), **origin, "rays_cast": int(rays.sum())}
+    key, shape = visibility_key(site, used, settings, name), (len(candidates), len(site.targets))
+    return VisibilityGrid(packed, shape, key, parameters)
+
+
+def _kept(
+    steps: Generator[Progress, None, None],
+    checkpoint: Checkpoint,
+    finished: Boolean,
+    packed: NDArray[np.uint8],
+    rays: Integer,
+) -> Generator[Progress, None, None]:
+    """Take the steps of a computation, and write what is finished from time to time and where it is ended."""
+    written = np.count_nonzero(finished)
+    with closing(steps):
+        try:
+            for step in steps:
+                yield step
+                if np.count_nonzero(finished) >= written + KEPT:
+                    written = np.count_nonzero(finished)
+                    checkpoint.save(np.flatnonzero(finished), packed, rays)
+        finally:
+            if not finished.all() and np.count_nonzero(finished) > written:
+                checkpoint.save(np.flatnonzero(finished), packed, rays)
+
+
+def stored_visibility(
+    path: Path,
+    site: Site,
+    models: Mapping[str, LidarModel],
+    settings: VisibilitySettings,
+    engine: Engine = "auto",
+    threads: int | None = None,
+) -> Generator[Progress, None, VisibilityGrid]:
+    """Return the grid of a file if it was computed from the same inputs; otherwise compute it and write the file.
+
+    A computation that is ended leaves its finished rows next to the file, from which the next one goes on.
+    """
+    stored = read_visibility(path, site, models, settings, engine)
+    if stored is not None:
+        yield Progress(len(site.candidates), len(site.candidates), "visibility, from an earlier run")
+        return stored
+    checkpoint = Checkpoint(path, visibility_key(site, models, settings, engine_name(engine)))
+    grid = yield from compute_visibility(site, models, settings, engine, threads, checkpoint)
+    grid.save(path)
+    checkpoint.remove()
+    return grid
+
+
+def read_visibility(
+    path: Path, site: Site, models: Mapping[str, LidarModel], settings: VisibilitySettings, engine: Engine = "auto"
+) -> VisibilityGrid | None:
+    """Return the grid of a file, or None if it is not one that was computed from the same inputs."""
+    try:
+        stored = VisibilityGrid.load(path)
+    except SeipError:
+        return None
+    key, shape = visibility_key(site, models, settings, engine_name(engine)), (len(site.candidates), len(site.targets))
+    return stored if stored.key == key and stored.shape == shape else None
 
 
 def _rays_of_full_scan(site: Site, used: Mapping[str, LidarModel]) -> int:

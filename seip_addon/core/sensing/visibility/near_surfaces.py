@@ -63,69 +63,15 @@ class Cuts:
             there &= ((points - self.corners[:, side]) * outward).sum(axis=1) <= margin * np.linalg.norm(edge, axis=1)
         return there
 
-    def bounds(self, tolerance: float) -> Discs:
-        """Return bounds, in plan and in height, on the intersection of disc and triangle."""
-        # In height: the intersection of the two intervals, that of the tilted disc and that of the corners.
-        middle = self.middle
-        a, b, c = self.corners[:, 0], self.corners[:, 1], self.corners[:, 2]
+    def heights(self, tolerance: float) -> tuple[Float, Float]:
+        """Return the heights (k,) between which disc and triangle meet; low > high if they do not."""
+        # The intersection of the two intervals, that of the tilted disc and that of the corners. The tolerance is added
+        # before the two are compared: on a level face both intervals are a single height, except for rounding, and
+        # without it the face might be lost.
         half = self.radius * np.sqrt(np.maximum(1 - self.normal[:, 2] ** 2, 0.0))
-        # The tolerance is added before the two are compared: on a level face both intervals are a single height, except
-        # for rounding, and without it the face might be lost.
-        low = np.maximum(middle[:, 2] - half, np.minimum(np.minimum(a[:, 2], b[:, 2]), c[:, 2])) - tolerance
-        high = np.minimum(middle[:, 2] + half, np.maximum(np.maximum(a[:, 2], b[:, 2]), c[:, 2])) + tolerance
-        # In plan: the disc's own circle, or the one about the triangle's centroid through its farthest corner if that
-        # is smaller, as for small or steep triangles. Either contains the intersection, and a smaller circle lets fewer
-        # rays pass.
-        centroid = (a + b + c) / 3
-        x, y = ((self.corners - centroid[:, None])[:, :, axis] for axis in (0, 1))
-        apart = x * x + y * y
-        reach = np.sqrt(np.maximum(np.maximum(apart[:, 0], apart[:, 1]), apart[:, 2]))
-        centre = np.where((reach < self.radius)[:, None], centroid, middle)
-        radius = np.minimum(reach, self.radius)
-        # where the intervals of height do not meet, triangle and disc do not either
-        both = low <= high
-        return Discs(
-            target=self.target[both],
-            centre=centre[both],
-            normal=self.normal[both],
-            radius=radius[both],
-            low=low[both],
-            high=high[both],
-            reflectivity=self.reflectivity[both],
-            cuts=self,
-        )
-
-
-@dataclass(frozen=True, eq=False)
-class Discs:
-    """Bounding cylinders of the intersections of triangles with balls of radius δ about targets.
-
-    Parameters
-    ----------
-    target : (k,) int64
-        Target of each, ascending.
-    centre : (k, 3) float64, metres
-        Centre in plan, on the triangle's plane.
-    normal : (k, 3) float64
-        Unit normals of the triangles.
-    radius : (k,) float64, metres
-        Radius in plan.
-    low, high : (k,) float64, metres
-        Heights between which the intersection lies.
-    reflectivity : (k,) float64, 0 to 1
-        Reflectivity of the triangles.
-    cuts : Cuts
-        Discs from which these were computed.
-    """
-
-    target: Integer
-    centre: Float
-    normal: Float
-    radius: Float
-    low: Float
-    high: Float
-    reflectivity: Float
-    cuts: Cuts
+        low = np.maximum(self.middle[:, 2] - half, self.corners[:, :, 2].min(axis=1)) - tolerance
+        high = np.minimum(self.middle[:, 2] + half, self.corners[:, :, 2].max(axis=1)) + tolerance
+        return low, high
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,7 +86,7 @@ class NearSurfaces:
         Heights between which there are surfaces within δ of each target; low > high if there is none.
     radius : float, metres
         δ plus the tolerance: returns that see a target are nearer than this in plan.
-    discs : Discs
+    cuts : Cuts
         Each of the surfaces.
     tolerance : float, metres
         Largest distance of a ray caster's returns from the surfaces. All heights and radii include it.
@@ -150,7 +96,7 @@ class NearSurfaces:
     low: Float
     high: Float
     radius: float
-    discs: Discs
+    cuts: Cuts
     tolerance: float
 
 
@@ -186,7 +132,7 @@ def near_surfaces(triangles: Float, targets: Float, delta: float, reflectivity: 
         target = near[order] + begin
         parts.append(_cut(triangles[triangle[order]], targets[target], target, radius, reflectivity[triangle[order]]))
     cuts = Cuts(*(np.concatenate([getattr(part, field.name) for part in parts]) for field in fields(Cuts)))
-    return _about(targets, radius, cuts.bounds(tolerance), tolerance)
+    return _about(targets, radius, cuts, tolerance)
 
 
 def rotated_surfaces(surfaces: NearSurfaces, origin: Float, orientation: Float) -> NearSurfaces:
@@ -201,8 +147,8 @@ def rotated_surfaces(surfaces: NearSurfaces, origin: Float, orientation: Float) 
     orientation : (3, 3) float64
         Rotation from the sensor's axes to the site's.
     """
-    cuts, tolerance = surfaces.discs.cuts, surfaces.tolerance
-    # The pairs of triangles and targets stay the same; only bounds in plan and height depend on the axes.
+    # the pairs of triangles and targets stay the same; only their heights depend on the axes
+    cuts = surfaces.cuts
     rotated_cuts = replace(
         cuts,
         # as one list of points: a separate product for each triangle is many times slower
@@ -211,15 +157,17 @@ def rotated_surfaces(surfaces: NearSurfaces, origin: Float, orientation: Float) 
         middle=(cuts.middle - origin) @ orientation,
     )
     targets = rotated(surfaces.xyz - origin, orientation.T)
-    return _about(targets, surfaces.radius, rotated_cuts.bounds(tolerance), tolerance)
+    return _about(targets, surfaces.radius, rotated_cuts, surfaces.tolerance)
 
 
-def _about(targets: Float, radius: float, discs: Discs, tolerance: float) -> NearSurfaces:
+def _about(targets: Float, radius: float, cuts: Cuts, tolerance: float) -> NearSurfaces:
     """Return the surfaces, with the joint heights of the discs of each target."""
     low, high = np.full(len(targets), np.inf), np.full(len(targets), -np.inf)
-    np.minimum.at(low, discs.target, discs.low)
-    np.maximum.at(high, discs.target, discs.high)
-    return NearSurfaces(targets, low, high, radius, discs, tolerance)
+    least, most = cuts.heights(tolerance)
+    meet = least <= most
+    np.minimum.at(low, cuts.target[meet], least[meet])
+    np.maximum.at(high, cuts.target[meet], most[meet])
+    return NearSurfaces(targets, low, high, radius, cuts, tolerance)
 
 
 def caster_tolerance(triangles: Float) -> float:

@@ -1,24 +1,14 @@
-"""Scans of the sensors at one position.
+"""Scan of a sensor at one position.
 
 A target is seen if some return of the scan lies nearer than δ to it and is strong enough. Where surfaces meet within
 the tolerance of the ray caster, it is chance which of them stops the ray; the return must then be strong enough from
-each of them. The same result as that of full scans is found with few rays:
-
-1. Only rays that can return from near a target are cast (`beam_culling`).
-2. For each sensor and target, the first is the one that should end nearest to the target.
-3. For targets not seen yet, bundles of neighbouring rays follow, each aimed at one surface near one target. A bundle is
-   dropped when its target is seen, or when the triangle that stopped a ray next to it is proven to stop all of its rays
-   (`occlusion`). Otherwise its middle ray is cast, and the two halves become new bundles.
-
-No ray is cast twice, neither for two targets nor for two sensors that share it.
-
-The rays of a rosette have no neighbours in rows: all of them that can return from near a target are cast
-(`ray_culling`).
+each of them. The same result as that of a full scan is found with few rays: only rays that can return from near a
+target are cast (`beam_culling`), in bundles of neighbours. The middle ray of a bundle is cast, and the two halves
+become new bundles, until the target is seen. No ray is cast twice.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -27,32 +17,27 @@ from ...base.arrays import Boolean, Float, Integer, concatenated_ranges
 from ...geometry.orientation import rotated
 from ..lidar.beams import BeamPattern
 from ..lidar.model import LidarModel
-from .beam_culling import Beams, NearRays, disc_patches, may_return, near_rays, target_patches
+from .beam_culling import NearRays, may_return, near_rays
 from .near_surfaces import NearSurfaces
-from .occlusion import stopped_by
 from .ray_casting import RayCaster
-from .ray_culling import rays_near
 from .settings import VisibilitySettings
 from .target_index import TargetIndex, is_within, squared_length
 
-_RAYS_AT_ONCE = 1 << 17  # bounds the memory of rays that are cast at once
 _PAIRS_AT_ONCE = 1 << 18  # of rays and surfaces: bounds the memory at borders of surfaces
 
 
 @dataclass(frozen=True, eq=False)
 class ScanPosition:
-    """Position of the sensors to scan from, with the conditions on their returns.
+    """Sensor at a position to scan from, with the conditions on its returns.
 
     Parameters
     ----------
     caster : RayCaster
         Ray caster in the site's axes.
     origin : (3,) float64, metres
-        Optical centre of the sensors, in the axes of the scan.
+        Optical centre, in the axes of the scan.
     yaw : float, radians
         Direction of azimuth zero, in the axes of the scan.
-    models : sequence of LidarModel
-        Sensors at this position.
     reflectivity : (n,) float64, 0 to 1
         Reflectivity of the caster's triangles.
     axes : ((3,) float64, (3, 3) float64), optional
@@ -62,13 +47,13 @@ class ScanPosition:
     caster: RayCaster
     origin: Float
     yaw: float
-    models: Sequence[LidarModel]
+    model: LidarModel
     settings: VisibilitySettings
     reflectivity: Float
     axes: tuple[Float, Float] | None = None
 
     def in_sensor_axes(self, orientation: Float) -> ScanPosition:
-        """Return the position in the axes of its sensors, which have the given orientation (3, 3) in the site."""
+        """Return the position in the axes of its sensor, which has the given orientation (3, 3) in the site."""
         return replace(self, origin=np.zeros(3), yaw=0.0, axes=(self.origin, orientation))
 
     def to_axes(self, points: Float) -> Float:
@@ -78,19 +63,20 @@ class ScanPosition:
         origin, orientation = self.axes
         return (points - origin) @ orientation
 
-    def cast(self, directions: Float, max_range: float) -> tuple[Float, Integer]:
-        """Cast rays along directions (n, 3) from the sensors' optical centre; see `RayCaster.cast`."""
+    def cast(self, directions: Float) -> tuple[Float, Integer]:
+        """Cast rays along directions (n, 3) from the optical centre to the end of the range; see `RayCaster.cast`."""
         if self.axes is None:
-            return self.caster.cast(self.origin, directions, max_range)
+            return self.caster.cast(self.origin, directions, self.model.max_range)
         origin, orientation = self.axes
-        return self.caster.cast(origin, rotated(directions, orientation), max_range)
+        return self.caster.cast(origin, rotated(directions, orientation), self.model.max_range)
 
     def corners(self, triangle: Integer) -> Float:
         """Return the corners of some of the caster's triangles (k, 3, 3), in the axes of the scan."""
         return self.to_axes(self.caster.triangles[triangle])
 
-    def counting(self, model: LidarModel, directions: Float, distance: Float, triangle: Integer) -> Boolean:
-        """Return which of a sensor's hits are returns: within its range and strong enough, (n,) bool."""
+    def counting(self, directions: Float, distance: Float, triangle: Integer) -> Boolean:
+        """Return which hits are returns: within the range and strong enough, (n,) bool."""
+        model = self.model
         counts = (distance >= model.min_range) & (distance <= model.max_range)
         least = self.settings.least_strength(model)
         if least > 0:
@@ -104,9 +90,9 @@ class ScanPosition:
         return counts
 
     def counting_at_borders(
-        self, model: LidarModel, surfaces: NearSurfaces, directions: Float, distance: Float, target: Integer
+        self, surfaces: NearSurfaces, directions: Float, distance: Float, target: Integer
     ) -> Boolean:
-        """Return which of a sensor's returns from near targets are strong enough for every surface that meets there.
+        """Return which returns from near targets are strong enough for every surface that meets there.
 
         Parameters
         ----------
@@ -121,7 +107,8 @@ class ScanPosition:
         -------
         (n,) bool
         """
-        least, cuts = self.settings.least_strength(model), surfaces.discs.cuts
+        model, cuts = self.model, surfaces.cuts
+        least = self.settings.least_strength(model)
         strong = np.ones(len(target), dtype=bool)
         if least == 0:
             return strong
@@ -143,14 +130,13 @@ class ScanPosition:
 
     def pairs_seen(
         self,
-        model: LidarModel,
         directions: Float,
         distance: Float,
         triangle: Integer,
         surfaces: NearSurfaces,
         index: TargetIndex,
     ) -> tuple[Integer, Integer]:
-        """Return each ray of a sensor with each target that its return sees, from the hits of n rays.
+        """Return each ray with each target that its return sees, from the hits of n rays.
 
         Parameters
         ----------
@@ -167,10 +153,10 @@ class ScanPosition:
             Indices of the pairs, rays ascending.
         """
         # A return may see several targets, and the strength at borders depends on the target's surfaces: pairs of both
-        returns = np.flatnonzero(self.counting(model, directions, distance, triangle))
+        returns = np.flatnonzero(self.counting(directions, distance, triangle))
         directions, distance = directions[returns], distance[returns]
         ray, target = index.pairs_within_delta(self.origin + distance[:, None] * directions)
-        strong = self.counting_at_borders(model, surfaces, directions[ray], distance[ray], target)
+        strong = self.counting_at_borders(surfaces, directions[ray], distance[ray], target)
         return returns[ray[strong]], target[strong]
 
 
@@ -184,113 +170,31 @@ def seen_by_near_rays(position: ScanPosition, surfaces: NearSurfaces) -> tuple[B
 
     Returns
     -------
-    seen : (models, t) bool
+    seen : (t,) bool
         Visibility, identical to that of a full scan, which casts every ray.
     cast : int
         Number of rays.
     """
-    # Bundles need rows of neighbouring rays. The rays of a rosette are not in rows: of these, each one that can return
-    # from near some target is cast.
-    with_channels = [model for model in position.models if model.rosette is None]
-    if len(with_channels) == len(position.models):
-        return _seen_by_channels(position, surfaces)
-    seen, cast = np.zeros((len(position.models), len(surfaces.xyz)), dtype=bool), 0
-    if with_channels:
-        of_these = np.array([model.rosette is None for model in position.models])
-        seen[of_these], cast = _seen_by_channels(replace(position, models=with_channels), surfaces)
-    index = TargetIndex(surfaces.xyz, position.settings.delta)
-    patches = target_patches(position.origin, surfaces, np.ones(len(surfaces.xyz), dtype=bool))
-    for number, model in enumerate(position.models):
-        if model.rosette is not None:
-            rays = rays_near(patches, position.yaw + model.azimuth_offsets, model.elevations, model.max_range)
-            seen[number] = seen_by_rays(position, model, rays, surfaces, index)
-            cast += len(rays)
-    return seen, cast
-
-
-def _seen_by_channels(position: ScanPosition, surfaces: NearSurfaces) -> tuple[Boolean, int]:
-    """Find the targets seen by sensors whose rays are the azimuth steps of channels; see `seen_by_near_rays`."""
-    beams = Beams.of(position.models, position.yaw, position.settings)
-    returns = _Returns(position, beams, surfaces)
-    seen = np.zeros((len(position.models), len(surfaces.xyz)), dtype=bool)
-
-    # First the likeliest ray for each sensor and target: most targets that can be seen are seen by it, and need no
-    # more. Patches of whole targets are enough for that choice.
-    possible = may_return(position.origin, surfaces, beams)
-    first = near_rays(beams, target_patches(position.origin, surfaces, possible.any(axis=0)))
-    first = first.pick(possible[beams.sensor[first.channel], first.target]).likeliest(beams.sensor)
-    sees, triangle = returns.see(first)
-    seen[beams.sensor[first.channel], first.target] = sees
-    # A target without any ray at this stage has no bundles later either: those are subsets of the same rays.
-    unseen = np.zeros(len(surfaces.xyz), dtype=bool)
-    unseen[first.target[~sees]] = True
-    blocker = np.full(seen.shape, -1)
-    blocker[beams.sensor[first.channel], first.target] = triangle
-
-    # Then the bundles for the rest, by the tighter patches of single surfaces. Each bundle carries the triangle that
-    # stopped the last ray cast for it: this is the likeliest one to stop all of it.
-    patches, planes = disc_patches(position.origin, surfaces, unseen)
-    bundles = near_rays(beams, patches, planes)
-    still_open = possible & ~seen
-    bundles = bundles.pick(np.flatnonzero(still_open[beams.sensor[bundles.channel], bundles.target]))
-    triangle = blocker[beams.sensor[bundles.channel], bundles.target]
+    returns, seen = _Returns(position, surfaces), np.zeros(len(surfaces.xyz), dtype=bool)
+    possible = may_return(position.origin, surfaces, position.model, position.settings)
+    bundles = near_rays(position.model, position.origin, position.yaw, surfaces, possible)
     # Each round splits bundles in halves, so that the rounds are few: the logarithm of the widest one. All middle rays
     # of a round are cast together, which the casters need to be fast. The loop ends when every ray of every bundle is
-    # cast, proven to be stopped, or of no use since its target is seen. So nothing is missed.
-    while len(bundles):
-        # Proven before anything is cast: on a scene with large occluders one triangle may stop a whole bundle, at
-        # the price of a few products. Bundles without a triangle (their last ray met nothing) cannot be proven.
-        stopped = (triangle >= 0) & (bundles.width > 1)  # a single ray is cast as quickly as it is proven stopped
-        corners = position.corners(triangle[stopped])
-        stopped[stopped] = stopped_by(position.origin, corners, beams, bundles.pick(stopped), planes)
-        bundles = bundles.pick(~stopped)
-        sees, triangle = returns.see(bundles)
-        seen[beams.sensor[bundles.channel[sees]], bundles.target[sees]] = True
-        # Another bundle of the same sensor may have seen the target in this round: looking at `seen` drops its bundles
-        # too. Halves inherit the triangle that stopped the middle ray between them.
-        unseen = np.flatnonzero(~seen[beams.sensor[bundles.channel], bundles.target])
-        bundles, part_of = bundles.pick(unseen).beside_middle()
-        triangle = triangle[unseen][part_of]
+    # cast, or of no use since its target is seen. So nothing is missed.
+    while len(bundles := bundles.pick(~seen[bundles.target])):
+        seen[bundles.target[returns.see(bundles)]] = True
+        bundles = bundles.beside_middle()
     return seen, returns.cast
 
 
-def seen_by_rays(
-    position: ScanPosition, model: LidarModel, rays: Integer, surfaces: NearSurfaces, index: TargetIndex
-) -> Boolean:
-    """Return the targets that a sensor sees with the given rays, all of which are cast, (t,) bool.
-
-    Parameters
-    ----------
-    rays : (n,) int64
-        Numbers of the rays, as in `BeamPattern`.
-    index : TargetIndex
-        Index of the targets.
-    """
-    pattern = BeamPattern(model, position.yaw)
-    seen = np.zeros(len(surfaces.xyz), dtype=bool)
-    for begin in range(0, len(rays), _RAYS_AT_ONCE):
-        directions = pattern.directions(rays[begin : begin + _RAYS_AT_ONCE])
-        distance, triangle = position.cast(directions, model.max_range)
-        seen[position.pairs_seen(model, directions, distance, triangle, surfaces, index)[1]] = True
-    return seen
-
-
 class _Returns:
-    """The returns of all sensors at one position, each ray cast when it is first needed.
+    """The returns of a sensor, each ray cast when it is first needed."""
 
-    Parameters
-    ----------
-    beams : Beams
-        Channels of the sensors at the position.
-    """
-
-    def __init__(self, position: ScanPosition, beams: Beams, surfaces: NearSurfaces) -> None:
-        self._position, self._beams, self._surfaces = position, beams, surfaces
-        self._patterns = [BeamPattern(model, position.yaw) for model in position.models]
-        self._first_channel = np.searchsorted(beams.sensor, np.arange(len(position.models)))
-        # Sensors may share rays, so that each is cast to the longest range of all; `counting` applies their own ranges.
-        self._reach = max(model.max_range for model in position.models)
-        self._row = np.zeros(beams.rays, dtype=np.int32)  # row of each ray in the arrays below; row 0: not cast yet
+    def __init__(self, position: ScanPosition, surfaces: NearSurfaces) -> None:
+        self._position, self._surfaces = position, surfaces
+        self._pattern = BeamPattern(position.model, position.yaw)
+        # row of each ray in the arrays below; row 0: not cast yet
+        self._row = np.zeros(position.model.channels * position.model.azimuth_count, dtype=np.int64)
         self._direction = np.zeros((1, 3))
         self._distance = np.full(1, np.inf)
         self._point = np.full((1, 3), np.inf)
@@ -301,60 +205,36 @@ class _Returns:
         """Number of rays that have been cast."""
         return len(self._distance) - 1
 
-    def see(self, bundles: NearRays) -> tuple[Boolean, Integer]:
-        """Find the bundles whose middle rays return from nearer than δ to their targets, strongly enough.
-
-        Returns
-        -------
-        sees : (k,) bool
-            Whether the middle ray of each bundle sees the bundle's target.
-        triangle : (k,) int64
-            Triangle that stops the ray; -1 for none.
-        """
+    def see(self, bundles: NearRays) -> Boolean:
+        """Return the bundles whose middle rays return from nearer than δ to their targets, strongly enough, (k,)."""
+        position, steps = self._position, self._position.model.azimuth_count
         # all-round bundles may run over step 0, where steps are negative or beyond the last one
-        row = self._rows(bundles.channel, bundles.middle % self._beams.steps[bundles.channel])
+        row = self._rows(bundles.channel * steps + bundles.middle % steps)
         gap = self._point[row] - self._surfaces.xyz[bundles.target]
-        sees = is_within(squared_length(gap), self._position.settings.delta)
-        triangle = self._triangle[row]
-        # the few rays that end near their target are also checked for range and strength, by the law of each sensor
+        sees = is_within(squared_length(gap), position.settings.delta)
+        # the few rays that end near their target are also checked for range and strength
         near = np.flatnonzero(sees)
-        for number, model in enumerate(self._position.models):
-            own = near[self._beams.sensor[bundles.channel[near]] == number]
-            directions, distance = self._direction[row[own]], self._distance[row[own]]
-            counts = self._position.counting(model, directions, distance, triangle[own])
-            counts[counts] = self._position.counting_at_borders(
-                model, self._surfaces, directions[counts], distance[counts], bundles.target[own[counts]]
-            )
-            sees[own] = counts
-        return sees, triangle
+        directions, distance = self._direction[row[near]], self._distance[row[near]]
+        counts = position.counting(directions, distance, self._triangle[row[near]])
+        counts[counts] = position.counting_at_borders(
+            self._surfaces, directions[counts], distance[counts], bundles.target[near[counts]]
+        )
+        sees[near] = counts
+        return sees
 
-    def _rows(self, channel: Integer, step: Integer) -> Integer:
+    def _rows(self, ray: Integer) -> Integer:
         """Return the rows of rays in the arrays, after casting those that are new."""
-        ray = self._beams.first_ray[channel] + step
-        fresh = np.flatnonzero(self._row[ray] == 0)
+        fresh = np.unique(ray[self._row[ray] == 0])
         if len(fresh):
-            # Bundles may share a ray, which must be cast once. Each writes its number to the ray's entry, where the
-            # last one remains: only the bundle that finds its own number there casts the ray.
-            self._row[ray[fresh]] = np.arange(len(fresh))
-            fresh = fresh[self._row[ray[fresh]] == np.arange(len(fresh))]
-            directions = self._directions(channel[fresh], step[fresh])
-            distance, triangle = self._position.cast(directions, self._reach)
-            self._row[ray[fresh]] = np.arange(len(fresh)) + len(self._distance)
+            directions = self._pattern.directions(fresh)  # as full scans have them, so that bits agree
+            distance, triangle = self._position.cast(directions)
+            self._row[fresh] = np.arange(len(fresh)) + len(self._distance)
             self._direction = np.concatenate([self._direction, directions])
             self._distance = np.concatenate([self._distance, distance])
             self._point = np.concatenate([self._point, _points(self._position.origin, directions, distance)])
             self._triangle = np.concatenate([self._triangle, triangle])
         rows: Integer = self._row[ray]
         return rows
-
-    def _directions(self, channel: Integer, step: Integer) -> Float:
-        """Return the directions of rays, (n, 3) float64, from the function that full scans use, so that bits agree."""
-        directions = np.empty((len(channel), 3))
-        for number, pattern in enumerate(self._patterns):
-            own = np.flatnonzero(self._beams.sensor[channel] == number)
-            local = channel[own] - self._first_channel[number]
-            directions[own] = pattern.directions(local * self._position.models[number].azimuth_count + step[own])
-        return directions
 
 
 def _points(origin: Float, directions: Float, distance: Float) -> Float:

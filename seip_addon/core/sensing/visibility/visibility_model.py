@@ -7,7 +7,6 @@ own axes, in which its channels are cones about z, like those of an upright one;
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 
 from ...base.arrays import Boolean, Float
 from ...site.site import Site
@@ -57,38 +56,37 @@ class VisibilityModel:
         return len(self._surfaces.xyz)
 
     def see(self, model: LidarModel, xyz: Float, orientation: Float) -> Boolean:
-        """Compute the targets that one sensor sees, (t,) bool; see `see_all`."""
-        only: Boolean = self.see_all([model], xyz, orientation)[0][0]
-        return only
+        """Compute the targets that a sensor sees, (t,) bool; see `scan`."""
+        return self.scan(model, xyz, orientation)[0]
 
-    def see_all(self, models: Sequence[LidarModel], xyz: Float, orientation: Float) -> tuple[Boolean, int]:
-        """Compute the targets that sensors of several models see from one position; they share rays.
+    def scan(self, model: LidarModel, xyz: Float, orientation: Float) -> tuple[Boolean, int]:
+        """Compute the targets that a sensor sees.
 
         Parameters
         ----------
         xyz : (3,) float64, metres
             Optical centre, local site axes.
         orientation : (3, 3) float64
-            Rotation from the sensors' axes to the site's.
+            Rotation from the sensor's axes to the site's.
 
         Returns
         -------
-        seen : (models, t) bool
-            Visibility of each target from each sensor.
+        seen : (t,) bool
+            Visibility of each target.
         cast : int
             Number of rays.
         """
         if is_upright(orientation):
-            return self.see_upright(models, xyz, yaw_of(orientation))
-        position = self._position(models, xyz, 0.0).in_sensor_axes(orientation)
+            return self.scan_upright(model, xyz, yaw_of(orientation))
+        position = self._position(model, xyz, 0.0).in_sensor_axes(orientation)
         return seen_by_near_rays(position, rotated_surfaces(self._surfaces, xyz, orientation))
 
-    def see_upright(self, models: Sequence[LidarModel], xyz: Float, yaw: float) -> tuple[Boolean, int]:
-        """Compute the targets that upright sensors of a given yaw, in radians, see; see `see_all`."""
-        return seen_by_near_rays(self._position(models, xyz, yaw), self._surfaces)
+    def scan_upright(self, model: LidarModel, xyz: Float, yaw: float) -> tuple[Boolean, int]:
+        """Compute the targets that an upright sensor of a given yaw, in radians, sees; see `scan`."""
+        return seen_by_near_rays(self._position(model, xyz, yaw), self._surfaces)
 
-    def _position(self, models: Sequence[LidarModel], xyz: Float, yaw: float) -> ScanPosition:
-        return ScanPosition(self._caster, xyz, yaw, models, self._settings, self._reflectivity)
+    def _position(self, model: LidarModel, xyz: Float, yaw: float) -> ScanPosition:
+        return ScanPosition(self._caster, xyz, yaw, model, self._settings, self._reflectivity)
 
 
 def visibility_model(site: Site, settings: VisibilitySettings, engine: Engine = "auto") -> VisibilityModel:

@@ -60,23 +60,6 @@ def test_attributes_are_text_that_set_attribute_takes(example):
     }
 
 
-def test_a_rosette_is_a_raster_over_the_square_about_it(example):
-    sensor = replace(example.deployment.sensors[0], model=load_catalogue()["mid40"])
-    (spawn,) = carla_spawns(replace(example.deployment, sensors=(sensor,)), np.zeros(3))
-    attributes = spawn["attributes"]
-    assert (attributes["channels"], attributes["points_per_second"], attributes["rotation_frequency"]) == (
-        "100",
-        "100000",
-        "10",
-    )
-    half = float(attributes["horizontal_fov"]) / 2
-    assert (float(attributes["upper_fov"]), float(attributes["lower_fov"])) == pytest.approx((half, -half))
-    assert half == pytest.approx(19.196, abs=1e-3)
-    assert "draws a rosette of 38.4 degrees that does not repeat" in spawn["note"]
-    assert "an even raster of 100 rows" in spawn["note"]
-    assert "unevenly" not in spawn["note"]
-
-
 def test_every_shipped_model_has_a_field_of_view_that_holds_its_beams(example):
     for model in load_catalogue().values():
         sensor = replace(example.deployment.sensors[0], model=model)

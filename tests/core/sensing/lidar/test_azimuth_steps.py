@@ -19,9 +19,7 @@ def test_the_steps_of_arcs_are_found_each_once(view: float, count: int, seed: in
     middle, half = random.uniform(-12, 12, 40), random.choice([0.01, 0.4, 3.1, math.pi, 4.0], 40) * random.random(40)
     half[:3] = math.pi, math.pi - 1e-9, math.pi + 1e-9
     size = view / count
-    arc, first, width = steps_in_arcs(
-        middle, half, np.full(40, size), np.full(40, count), np.full(40, view == math.tau)
-    )
+    arc, first, width = steps_in_arcs(middle, half, size, count, all_round=view == math.tau)
     assert (np.diff(arc) >= 0).all()
     assert (width > 0).all()
     for number in range(40):
@@ -35,6 +33,6 @@ def test_the_steps_of_arcs_are_found_each_once(view: float, count: int, seed: in
 
 def test_an_arc_over_both_ends_of_a_field_of_view_is_two_rows() -> None:
     """Ten steps from 0 to 288 degrees: an arc of 200 degrees about 324 holds those up to 64 and from 224 on."""
-    of_one = np.array([math.radians(324)]), np.array([math.radians(100)]), np.array([math.radians(32)]), np.array([10])
-    arc, first, width = steps_in_arcs(*of_one, np.array([False]))
+    of_one = np.array([math.radians(324)]), np.array([math.radians(100)]), math.radians(32), 10
+    arc, first, width = steps_in_arcs(*of_one, all_round=False)
     assert (arc.tolist(), first.tolist(), width.tolist()) == ([0, 0], [0, 7], [3, 3])

@@ -6,7 +6,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from seip_addon.core.sensing.lidar.beams import BeamPattern
 from seip_addon.core.sensing.lidar.catalogue import load_catalogue
 from seip_addon.core.sensing.lidar.rings import beam_rings
 
@@ -17,7 +16,7 @@ def rings_of(key="type1", height=5.0, gap=2.0, axes=None):
     return beam_rings(MODELS[key], np.array((3.0, 4.0, height)), np.eye(3) if axes is None else axes, 0.0, gap)
 
 
-@pytest.mark.parametrize("key", [key for key, model in MODELS.items() if model.rosette is None])
+@pytest.mark.parametrize("key", MODELS)
 def test_a_level_sensor_draws_circles_of_height_over_tangent(key):
     model = MODELS[key]
     drawn = rings_of(key).rings
@@ -47,19 +46,3 @@ def test_rings_and_cone_end_at_the_borders_of_a_limited_field_of_view():
         azimuth = np.degrees(np.arctan2(ends[:, 1], ends[:, 0]))
         assert (azimuth.min(), azimuth.max()) == pytest.approx((-across, across), abs=1e-9)
     assert np.linalg.norm(np.diff(drawn.rings, axis=1), axis=-1).max() < 2.0
-
-
-def test_a_rosette_draws_its_line_and_its_rim():
-    model, place = MODELS["mid40"], np.array((3.0, 4.0, 8.0))
-    drawn = beam_rings(model, place, np.eye(3), 0.0, 2.0, resolved=30.0)
-    ways = BeamPattern(model).directions(np.arange(model.channels))
-    meets = (ways[:, 2] < 0) & (-ways[:, 2] * model.max_range > 8.0)
-    assert len(drawn.rings) == (meets[1:] & meets[:-1]).sum()
-    assert np.allclose(drawn.rings[..., 2], 0.0)
-    ends = drawn.rings[:, 1] - place
-    off = np.linalg.norm(np.cross(ends[:50], ways[1:][meets[1:] & meets[:-1]][:50]), axis=1)
-    assert off.max() < 1e-9 * np.linalg.norm(ends[:50], axis=1).max()
-    assert (drawn.wide == (np.hypot(*ends[:, :2].T) > 30.0)).all()
-    assert drawn.cone.shape == (12, 2, 3)
-    rim = drawn.cone[:, 1] - place
-    assert np.degrees(np.arctan2(np.hypot(rim[:, 1], rim[:, 2]), rim[:, 0])) == pytest.approx([19.196] * 12, abs=1e-3)

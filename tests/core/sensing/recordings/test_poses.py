@@ -1,13 +1,11 @@
-"""Poses of sensors in all formats, and files that hold none."""
+"""Poses of sensors, and files that hold none."""
 
 import json
 
 import numpy as np
 import pytest
-import yaml
 
 from seip_addon.core.base.errors import SeipError
-from seip_addon.core.output.datasets.formats import CALIBRATION
 from seip_addon.core.sensing.recordings.poses import read_poses
 from tests.builders.scan_frames import rotation
 
@@ -43,39 +41,10 @@ POSES = {"S1": make_pose(1), "s110_lidar.south": make_pose(2), "Pole 3": make_po
 LISTS = {name: pose.tolist() for name, pose in POSES.items()}
 
 
-@pytest.mark.parametrize("flow", [False, None])
 @pytest.mark.parametrize("flat", [True, False])
-def test_yaml_as_pyyaml_writes_it(flow, flat, tmp_path):
+def test_json(flat, tmp_path):
     lists = {name: np.ravel(pose).tolist() if flat else pose for name, pose in LISTS.items()}
-    text = "# measured in May\n---\n" + yaml.safe_dump(lists, default_flow_style=flow)
-    same(read(tmp_path, "p.yaml", text.replace("\nS1:\n", "\nS1:  # south\n")), POSES)
-
-
-def test_json(tmp_path):
-    same(read(tmp_path, "p.json", json.dumps(LISTS)), POSES)
-    for key in ("name", "id"):
-        listed = {"sensors": [{key: name, "pose": pose, "model": "os1_128"} for name, pose in LISTS.items()]}
-        same(read(tmp_path, "p.json", json.dumps(listed)), POSES)
-
-
-def test_dair(tmp_path):
-    pose = make_pose()
-    for shape in ((3,), (3, 1)):
-        content = {"rotation": pose[:3, :3].tolist(), "translation": pose[:3, 3].reshape(shape).tolist()}
-        content["relative_error"] = {"delta_x": "", "delta_y": ""}
-        same(read(tmp_path, "000009.json", json.dumps(content)), {"000009": pose})
-
-
-def test_kitti(tmp_path):
-    pose = make_pose()
-    numbers = " ".join(repr(number) for number in pose[:3].ravel().tolist())
-    same(read(tmp_path, "calib.txt", f"{CALIBRATION}Tr_velo_to_world: {numbers}\n"), {"calib": pose})
-    same(read(tmp_path, "calib.txt", CALIBRATION), {"calib": np.eye(4)})
-    right, down, forward = np.array([[0, -1, 0], [0, 0, -1], [1, 0, 0]])  # x right, y down, z forward of a camera
-    camera = np.eye(4)
-    camera[:3, :3] = [right, down, forward]
-    numbers = " ".join(repr(number) for number in (camera @ pose)[:3].ravel().tolist())
-    same(read(tmp_path, "calib.txt", f"P0: 1 0 0 0\nTr: {numbers}\n"), {"calib": pose})
+    same(read(tmp_path, "p.json", json.dumps(lists)), POSES)
 
 
 def test_rotations_that_are_rounded_are_made_exact(tmp_path):
@@ -104,26 +73,12 @@ def changed(at, value):
         ("number NaN", changed((0, 3), np.nan)),
         ("no readable poses", json.dumps({"S1": [[1, 2], [3]]})),
         ("no readable poses", json.dumps({"S1": {"x": 1}})),
-        ("no readable poses", json.dumps({"sensors": [{"name": "S1"}]})),
-        ("no readable poses", json.dumps({"sensors": 3})),
-        ("two sensors have one name", json.dumps({"sensors": [{"id": 1, "pose": 0}, {"id": "1", "pose": 0}]})),
-        ("no readable poses", json.dumps({"rotation": 1, "translation": 2})),
         ("its structure is another one", "[1, 2]"),
         ("names no sensor", "{}"),
         ("printable characters", json.dumps({"": np.eye(4).tolist()})),
         ("printable characters", json.dumps({"S" * 4000: np.eye(4).tolist()})),
         ("no readable poses", "[" * 100_000),
         ("no readable poses", '{"S1": '),
-        ("as JSON", yaml.safe_dump(LISTS, default_flow_style=True)),
-        ("convert it to JSON", "sensors:\n- name: S1\n  pose: [1, 2]\n"),
-        ("convert it to JSON", "S1: *anchor\n"),
-        ("convert it to JSON", "S1: [.nan, 0]\n"),
-        ("convert it to JSON", "S1: [1]\nS1: [1]\n"),
-        ("16 numbers", "S1: [1, 2, 3]\n"),
-        ("none of Tr_velo_to_world", "Tr_imu_to_velo: 1 0 0 0\n"),
-        ("no readable poses", "Tr: 1 0 0\n"),
-        ("16 numbers", "Tr: 1 0 0 0 0 1 0 0 0 0 1 1e400\n"),
-        ("no readable poses", "Tr_velo_to_world: 1 0 0 0 0 1 0 0 0 0 far 0\n"),
         ("is empty", ""),
     ],
 )

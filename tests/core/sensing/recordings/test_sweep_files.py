@@ -3,7 +3,6 @@
 import struct
 import zipfile
 
-import lzf
 import numpy as np
 import pytest
 from hypothesis import given
@@ -11,12 +10,11 @@ from hypothesis import strategies as st
 
 from seip_addon.core.base.errors import SeipError
 from seip_addon.core.geometry.orientation import quaternion_of
-from seip_addon.core.sensing.recordings.pcd_file import lzf_decompressed
 from seip_addon.core.sensing.recordings.sweep_files import read_sweep
 from tests.builders.recording_files import make_points, pcd_text, write_sweep_file
 from tests.builders.scan_frames import rotation
 
-FORMATS = (".pcd", ".bin", ".pcd.bin", ".npz")
+FORMATS = (".pcd", ".bin", ".npz")
 
 
 def read(folder, name, content):
@@ -46,7 +44,7 @@ def test_formats_hold_the_same(suffix, tmp_path):
     assert (sweep.viewpoint, sweep.time) == (None, None)
 
 
-@pytest.mark.parametrize("data", ["ascii", "binary", "binary_compressed"])
+@pytest.mark.parametrize("data", ["ascii", "binary"])
 @given(
     seed=st.integers(0, 1000),
     count=st.integers(0, 40),
@@ -87,25 +85,6 @@ def test_further_columns_of_bin_files_are_ignored(more, tmp_path):
     same(read(tmp_path, "a.bin", table.astype("<f4").tobytes()), columns)
 
 
-def test_pcd_of_stored_bytes(tmp_path):
-    columns = make_points(count=30)
-    whole = b"".join(column.tobytes() for column in columns.values())
-    head = pcd_text(columns, "binary_compressed").partition(b"DATA binary_compressed\n")
-    content = head[0] + head[1] + struct.pack("<II", len(whole), len(whole)) + whole
-    same(read(tmp_path, "a.pcd", content), columns)
-
-
-@given(st.lists(st.binary(max_size=40) | st.tuples(st.binary(min_size=1, max_size=9), st.integers(2, 400))))
-def test_lzf_against_another_compressor(parts):
-    whole = b"".join(part if isinstance(part, bytes) else part[0] * part[1] for part in parts)
-    if whole:
-        packed = lzf.compress(whole, 2 * len(whole) + 100)
-        assert lzf_decompressed(packed, len(whole)) == whole
-        for size in (len(whole) - 1, len(whole) + 1):
-            with pytest.raises(ValueError, match="do not stand for"):
-                lzf_decompressed(packed, size)
-
-
 @pytest.mark.parametrize("suffix", FORMATS)
 def test_cut_files(suffix, tmp_path):
     """A cut between two points of a format without a header or end gives the points before."""
@@ -123,9 +102,8 @@ def test_cut_files(suffix, tmp_path):
         else:
             assert (sweep.points == xyz[: len(sweep)]).all()
             whole.append(part)
-    size = {".bin": 16, ".pcd.bin": 20}.get(suffix)
-    if size:
-        assert whole == [part for part in range(1, 50) if len(content) * part // 50 % size == 0]
+    if suffix == ".bin":
+        assert whole == [part for part in range(1, 50) if len(content) * part // 50 % 16 == 0]
     else:
         assert not whole
 
@@ -153,14 +131,9 @@ def test_cut_files(suffix, tmp_path):
         ("no PCD header", {"FIELDS": "x " * 40_000}),
     ],
 )
-@pytest.mark.parametrize("data", ["ascii", "binary", "binary_compressed"])
+@pytest.mark.parametrize("data", ["ascii", "binary"])
 def test_contradicting_headers_of_pcd(data, words, changes, tmp_path):
     refused(words, tmp_path, "a.pcd", pcd_text(make_points(count=6), data, **changes))
-
-
-def test_a_compressed_pcd_of_too_many_bytes(tmp_path):
-    head = pcd_text(make_points(count=1), WIDTH=10**7, POINTS=10**7, DATA="binary_compressed").split(b"compressed\n")[0]
-    refused("announces", tmp_path, "a.pcd", head + b"compressed\n" + struct.pack("<II", 9, 18 * 10**7) + bytes(9))
 
 
 @pytest.mark.parametrize(
@@ -169,9 +142,9 @@ def test_a_compressed_pcd_of_too_many_bytes(tmp_path):
         ("is empty", "a.bin", b""),
         ("is empty", "a.pcd", b""),
         ("not whole points of 4 to 6", "a.bin", bytes(28)),
-        ("not whole points of 5", "a.pcd.bin", bytes(16)),
         ("intensity is nan", "a.bin", np.array([1, 2, 3, np.nan], "<f4").tobytes()),
         ("map coordinates", "a.bin", np.array([1, 2e4, 3, 0], "<f4").tobytes()),
+        ("it is compressed; write it as binary", "a.pcd", pcd_text(make_points(), "binary_compressed")),
         ("not a text file", "a.pcd", b"\xff\nDATA ascii\n"),
         ("damaged or not an npz file", "a.npz", b"PK\x03\x04 and so on"),
         ("not a sweep: give a file", "a.csv", b"x,y,z\n1,2,3\n"),
@@ -199,5 +172,5 @@ def test_random_bytes(tmp_path_factory, content, suffix):
         sweep = read(tmp_path_factory.mktemp("any"), f"a{suffix}", content)
     except SeipError:
         return
-    assert suffix in {".bin", ".pcd.bin"}
+    assert suffix == ".bin"
     assert np.isfinite(sweep.points).all()

@@ -5,9 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from seip_addon.core.sensing.lidar.noisy_returns import return_chance
 from seip_addon.core.sensing.recordings.comparison import AGREES, NOTHING, compare_rays
-from seip_addon.core.sensing.recordings.unit_gain import RANGE_EDGES, fitted_gain, return_shares
+from seip_addon.core.sensing.recordings.unit_gain import fitted_gain
 from tests.builders.scanned_street import ground_mesh, mounted, street_background, street_meshes, surface_of
 from tests.few import few
 
@@ -51,19 +50,3 @@ def test_a_recording_without_losses_has_no_gain(surface):
     few = one.result.copy()
     few[np.flatnonzero(np.isin(few, (AGREES, NOTHING)))[400:]] = -1
     assert fitted_gain(replace(one, result=few)) is None
-
-
-def test_shares_of_returns_are_means_over_surfaces_and_ranges(surface):
-    one = compared(surface, 0.5)
-    ground, walls = np.arange(2), np.arange(2, len(surface.normals))
-    shares = return_shares(one, 0.5, [("ground", ground), ("objects", walls)])
-    assert {share.surface for share in shares} == {"ground", "objects"}
-    used = np.isin(one.result, (AGREES, NOTHING)) & (one.predicted >= PLANNED.model.min_range)
-    chance = return_chance(one.sensor.model, one.predicted, one.reflected)
-    for share in shares:
-        assert share.low in RANGE_EDGES
-        triangles = ground if share.surface == "ground" else walls
-        own = used & np.isin(one.triangle, triangles) & (one.predicted >= share.low) & (one.predicted < share.high)
-        assert (share.rays, share.measured) == (own.sum(), pytest.approx(one.returned[own].mean()))
-        assert share.predicted == pytest.approx(chance[own].mean())
-        assert share.fitted <= share.predicted

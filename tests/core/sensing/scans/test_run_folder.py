@@ -11,7 +11,6 @@ import pytest
 
 from seip_addon.core.base.errors import SeipError
 from seip_addon.core.base.progress import finish
-from seip_addon.core.sensing.lidar.rosette import Rosette
 from seip_addon.core.sensing.scans.frame import Frame
 from seip_addon.core.sensing.scans.run_folder import (
     Run,
@@ -63,20 +62,6 @@ def test_a_run_says_what_it_is_made_of_and_reads_back(tmp_path) -> None:
         frame = frames[entry["name"]]
         assert (entry["time_s"], entry["points"], entry["road_users"]) == (frame.time, len(frame), 2)
         assert set(frame.sensor.tolist()) == {0, 1}
-
-
-def test_a_rosette_is_in_the_record_by_its_prisms_and_reads_back(tmp_path) -> None:
-    prisms = Rosette((60.0, -43.0), (0.3, 0.25), 1.5)
-    run = make_run(sensors=(make_sensor(points_per_second=5e3, rosette=prisms), make_sensor(label="S2")))
-    record = finish(steps(tmp_path / "run", run))
-    assert record == load_manifest(tmp_path / "run")
-    model = record["sensors"][0]["model"]
-    assert (model["elevations"], model["azimuth_offsets"]) == ([], [])
-    figures = {name: tuple(value) if isinstance(value, list) else value for name, value in model["rosette"].items()}
-    assert Rosette(**figures) == prisms
-    assert "rosette" not in record["sensors"][1]["model"]
-    other = Rosette((60.0, -44.0), (0.3, 0.25), 1.5)
-    assert replace(run, sensors=(make_sensor(points_per_second=5e3, rosette=other), run.sensors[1])).key != run.key
 
 
 def test_the_same_run_is_the_same_bytes_stopped_or_not(tmp_path) -> None:

@@ -16,7 +16,6 @@ from seip_addon.core.base.progress import finish
 from seip_addon.core.geometry.orientation import rotations
 from seip_addon.core.sensing.lidar.carla_dropoff import CarlaDropoff
 from seip_addon.core.sensing.lidar.catalogue import load_catalogue
-from seip_addon.core.sensing.lidar.rosette import Rosette
 from seip_addon.core.sensing.scans.beam_culling import BeamWindows
 from seip_addon.core.sensing.scans.frame import STATIC_INSTANCE, Frame, Labels
 from seip_addon.core.sensing.scans.sensor import MountedSensor, level_orientation
@@ -38,7 +37,6 @@ from tests.engines import ANY, each_engine, needs_any
 from tests.oracles.float64_rays import first_hits
 from tests.oracles.grazing_rays import exact_hit, grazes, passes_an_edge
 from tests.oracles.random_cases import cases
-from tests.oracles.visibility_search import behind_prisms
 
 pytestmark = needs_any
 
@@ -174,43 +172,6 @@ def test_an_edge_is_found_where_it_is() -> None:
     )
 
 
-PRISMS = Rosette((121.5, -77.7), (math.radians(18), math.radians(18)), 1.51)
-ROSETTE = {"points_per_second": 20e3, "rosette": PRISMS}
-
-
-@each_engine
-def test_a_rosette_goes_on_from_frame_to_frame(engine) -> None:
-    """All about is a box, so that each ray returns: along the prisms' directions at the time of the frame."""
-    walls = box_triangles((-20.0, -20.0, -20.0), (20.0, 20.0, 20.0))
-    sensor = make_sensor((1.0, 2.0, 3.0), yaw=0.7, **ROSETTE)
-    made = simulation(make_static(walls), [sensor], parked(), replace(EXACT, engine=engine))
-    frames = [made.frame(number, number / 10) for number in range(3)]
-    for number, frame in enumerate(frames):
-        rays = behind_prisms(replace(PRISMS, begin=number / 10), 20e3, 10.0) @ sensor.orientation.T
-        assert len(frame) == 2000
-        away = frame.points - sensor.xyz
-        np.testing.assert_allclose(away / np.linalg.norm(away, axis=1)[:, None], rays, atol=1e-6)
-        assert np.abs(frame.points).max(axis=1) == pytest.approx(20.0, abs=1e-4)
-    assert not same(frames[0], replace(frames[1], time=0.0))
-
-
-@each_engine
-@cases(10)
-@given(place=places(), time=st.floats(0, 9))
-def test_returns_of_rosettes_are_those_of_a_full_scan(engine, place, time) -> None:
-    static, sensors, cars = place
-    sensors = [replace(sensor, model=replace(sensor.model, **ROSETTE)) for sensor in sensors]
-    made = simulation(static, sensors, cars, replace(EXACT, engine=engine))
-    snapshot = cars.at(time)
-    surface, owner = combined(static, [box_body(user) for user in cars.users], snapshot, engine)
-    for scanner, scan in zip(made.scanners, made.scans(snapshot), strict=True):
-        full = full_scan(scanner, surface, owner, len(cars))
-        rays = differing(scan, full)
-        assert len(rays) < 20
-        for ray in rays:
-            assert grazes(scanner.sensor.xyz, scanner.directions[ray], surface.caster.triangles, scan.distance[ray])
-
-
 @cases(30)
 @given(seed=st.integers(0, 2**32 - 1))
 def test_windows_hold_every_ray_through_a_hull(seed) -> None:
@@ -312,29 +273,6 @@ def test_with_a_rolling_shutter_each_ray_meets_what_is_there_at_its_own_time(eng
     assert different.sum() <= 1
     both = looked[np.isfinite(expected[looked]) & np.isfinite(scan.distance[looked])]
     np.testing.assert_allclose(scan.distance[both], expected[both], atol=1e-4)
-
-
-def test_with_a_rolling_shutter_each_ray_of_a_rosette_meets_what_is_there_at_its_own_time() -> None:
-    way = [(0.0, 12.0, -1.0, 0.0, 0.3, 0.0), (0.35, 12.0, 2.0, 0.0, 1.3, 0.0)]
-    cars, sensor = make_trajectories(way), make_sensor((0.0, 0.0, 1.0), **ROSETTE)
-    made = simulation(make_static(), [sensor], cars, replace(EXACT, rolling_shutter=True))
-    frame = made.frame(2, 0.2)
-    assert len(frame) > 50
-    rays = behind_prisms(replace(PRISMS, begin=0.2), 20e3, 10.0)
-    number = np.rint(frame.delay * 20e3).astype(int)
-    np.testing.assert_allclose(frame.delay, number / 20e3, atol=1e-9)
-    body = box_body(cars.users[0]).triangles
-    distance = np.array(
-        [
-            first_hits(sensor.xyz, rays[[ray]], then.position + body @ rotations(then.yaw, then.pitch)[0].T)[0]
-            for ray in range(2000)
-            for then in [cars.at(0.2 + ray / 20e3)]
-        ]
-    )
-    assert len(set(np.flatnonzero(np.isfinite(distance))) ^ set(number)) <= 2  # rays along an edge
-    met = np.isfinite(distance[number])
-    expected = sensor.xyz + distance[number[met], None] * rays[number[met]]
-    np.testing.assert_allclose(frame.points[met], expected, atol=1e-3)
 
 
 def test_a_rolling_shutter_moves_a_face_by_speed_times_delay() -> None:

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from seip_addon.core.sensing.traffic.parked import parked_users
+from seip_addon.core.sensing.traffic.trajectories import parked_users
 from tests.builders.traffic_by_hand import make_trajectories
 
 

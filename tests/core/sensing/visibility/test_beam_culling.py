@@ -12,15 +12,10 @@ from hypothesis import strategies as st
 from seip_addon.core.sensing.lidar.catalogue import load_catalogue
 from seip_addon.core.sensing.lidar.model import LidarModel
 from seip_addon.core.sensing.visibility.beam_culling import (
-    Beams,
     NearRays,
-    Patches,
-    disc_patches,
     near_rays,
-    target_patches,
 )
 from seip_addon.core.sensing.visibility.near_surfaces import NearSurfaces, near_surfaces
-from seip_addon.core.sensing.visibility.settings import VisibilitySettings
 from seip_addon.core.site.scene_geometry import DEFAULT_REFLECTIVITY
 from tests.oracles.full_scan import beam_directions
 
@@ -81,20 +76,12 @@ def test_every_ray_that_returns_from_near_a_target_is_kept(seed: int, delta: flo
     targets += random.normal(0, 0.3 * delta, (30, 3))
     targets[0] = origin + random.normal(0, 0.3 * delta, 3)  # δ about it may hold the sensor
     surfaces = surfaces_near(triangles, targets, delta)
-    beams = Beams.of([model], yaw, VisibilitySettings(delta))
-    coarse = near_rays(beams, target_patches(origin, surfaces, all_of(surfaces)))
-    patches, planes = disc_patches(origin, surfaces, np.ones(30, dtype=bool))
-    fine = near_rays(beams, patches, planes)
+    near = near_rays(model, origin, yaw, surfaces, all_of(surfaces))
 
     points = hits(origin, beam_directions(model, yaw).reshape(-1, 3), triangles)
     distance = np.linalg.norm(points[None] - targets[:, None, None], axis=3)
     returns = (distance < delta).any(axis=2)
-    for near in (coarse, fine):
-        assert rays_by_target(near, model, 30)[returns].all()
-    within_range = np.linalg.norm(targets - origin, axis=1) < 60 - delta
-    likeliest = near_rays(beams, target_patches(origin, surfaces, all_of(surfaces))).likeliest(beams.sensor)
-    assert set(np.flatnonzero(returns.any(axis=1) & within_range)) <= set(likeliest.target.tolist())
-    assert len(np.unique(likeliest.target)) == len(likeliest.target)
+    assert rays_by_target(near, model, 30)[returns].all()
 
 
 def all_of(surfaces):
@@ -112,10 +99,7 @@ def test_hardly_a_ray_is_kept_that_passes_over_its_target() -> None:
     model = load_catalogue()["type3"]
     origin = np.array([0.0, 0.0, 5.0])
     surfaces = surfaces_near(road(80.0), targets, 1.0)
-    near = near_rays(
-        Beams.of([model], 0.3, VisibilitySettings()),
-        target_patches(origin, surfaces, all_of(surfaces)),
-    )
+    near = near_rays(model, origin, 0.3, surfaces, all_of(surfaces))
     down = np.tan(model.elevations)[near.channel]
     radius = -5.0 / down
     ends = near.target[down < 0]
@@ -126,34 +110,16 @@ def test_hardly_a_ray_is_kept_that_passes_over_its_target() -> None:
 
 def test_targets_out_of_range_and_without_surface_need_no_ray() -> None:
     model = replace(random_model(np.random.default_rng(0)), min_range=0.5)
-    patches = Patches(
-        *(np.array(values) for values in ([0, 1, 2], [0.0, 0, 0], [61.5, 0.1, 9], [0.3, 0.3, 0.3])),
-        *(np.array(values) for values in ([-0.1, -0.1, np.inf], [0.1, 0.1, -np.inf])),
-    )
-    assert len(near_rays(Beams.of([model], 0.0, VisibilitySettings()), patches)) == 0
+    targets = np.array([[61.5, 0.0, 0.0], [0.1, 0.0, 0.0], [9.0, 0.0, 30.0]])
+    surfaces = surfaces_near(road(80.0), targets, 0.3)
+    assert len(near_rays(model, np.array([0.0, 0.0, 0.1]), 0.0, surfaces, all_of(surfaces))) == 0
 
 
 def test_least_range_is_measured_along_the_ray() -> None:
     """Straight below a sensor a return is near in plan and as far off as the sensor is high."""
     model = replace(random_model(np.random.default_rng(0)), elevations=np.full(1, -1.4), azimuth_offsets=np.zeros(1))
     surfaces = surfaces_near(road(20.0), np.array([[0.5, 0.0, 0.0]]), 1.0)
-    patches = target_patches(np.array([0.0, 0.0, 6.0]), surfaces, all_of(surfaces))
+    origin = np.array([0.0, 0.0, 6.0])
     for least, some in ((5.0, True), (7.0, False)):
-        beams = Beams.of([replace(model, min_range=least)], 0.0, VisibilitySettings())
-        assert (len(near_rays(beams, patches)) > 0) == some
-
-
-def test_a_sensor_as_far_above_a_face_as_returns_may_lie_off_it() -> None:
-    surfaces = surfaces_near(road(20.0), np.array([[0.2, 0.0, 0.0]]), 1.0)
-    patches, planes = disc_patches(np.array([0.0, 0.0, surfaces.tolerance]), surfaces, np.array([True]))
-    model = replace(random_model(np.random.default_rng(0)), elevations=np.full(1, -1.2), azimuth_offsets=np.zeros(1))
-    assert (near_rays(Beams.of([model], 0.0, VisibilitySettings()), patches, planes).width == model.azimuth_count).any()
-
-
-def test_sensors_share_the_rays_of_equal_channels() -> None:
-    models = load_catalogue()
-    beams = Beams.of([models["type2"], models["type3"]], 0.2, VisibilitySettings())
-    equal = np.isin(models["type3"].elevations, models["type2"].elevations)
-    assert equal.any()
-    assert beams.rays == 7500 * (32 + 128 - equal.sum())
-    assert set(beams.first_ray[32:][equal]) <= set(beams.first_ray[:32])
+        near = near_rays(replace(model, min_range=least), origin, 0.0, surfaces, all_of(surfaces))
+        assert (len(near) > 0) == some

@@ -1,4 +1,4 @@
-"""Float32: both ray casters against float64 on hard scenes, and the warnings where it is too coarse."""
+"""Float32: both ray casters against float64 on hard scenes."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ import shapely
 from seip_addon.core.base.progress import finish
 from seip_addon.core.sensing.lidar.beams import BeamPattern
 from seip_addon.core.sensing.lidar.model import LidarModel
-from seip_addon.core.sensing.visibility.float32_precision import FLOAT32_STEP, rounding_warnings
 from seip_addon.core.sensing.visibility.grid import compute_visibility
 from seip_addon.core.sensing.visibility.ray_casting import make_ray_caster
 from seip_addon.core.sensing.visibility.settings import MAX_DELTA, Engine, VisibilitySettings
@@ -22,6 +21,9 @@ from tests.engines import each_engine
 from tests.oracles.float64_bounds import FirstHits, first_hits
 from tests.oracles.float64_rays import first_hits as plain_first_hits
 from tests.oracles.hard_scenes import HardScene, hard_scenes, ordinary_scene, stored_far_away, with_stray
+
+FLOAT32_STEP = float(np.finfo(np.float32).eps)
+"""Largest step of float32 as a share of a coordinate."""
 
 MAX_ROUNDINGS = 64
 """Tolerance of a hit, in steps of float32 at the scene's extent; visibility uses the same."""
@@ -150,7 +152,7 @@ def test_hard_scenes_flip_no_hit_and_no_target(engine: Engine, name: str) -> Non
 
 
 @each_engine
-def test_where_the_tool_warns_float32_moves_hits(engine: Engine) -> None:
+def test_float32_moves_hits_where_coordinates_are_large(engine: Engine) -> None:
     here = truth(STREET)
 
     def largest_error(scene: HardScene, exact: FirstHits) -> float:
@@ -176,19 +178,6 @@ GROUND = np.array([[[-20.0, -4, 0], [20, -4, 0], [20, 4, 0]], [[-20, -4, 0], [20
 
 def moved(x: float, y: float) -> np.ndarray:
     return GROUND + np.array([x, y, 0.0])
-
-
-def test_a_scene_at_map_coordinates_is_warned_of() -> None:
-    (warning,) = rounding_warnings(geometry(moved(5e5, 5.3e6)))
-    assert "5,300,0" in warning
-    assert "move it to the origin" in warning
-
-
-def test_a_stray_mesh_is_warned_of_by_name() -> None:
-    stray = Mesh("left behind", moved(3e4, 0))
-    (warning,) = rounding_warnings(geometry(GROUND, stray))
-    assert "'left behind'" in warning
-    assert "30,0" in warning
 
 
 SHORT = SurveySettings(candidates=CandidateSettings(sensors=("type3",), heights=(5.4,), setback=0.5))

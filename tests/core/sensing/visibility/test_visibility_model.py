@@ -8,7 +8,7 @@ import pytest
 
 from seip_addon.core.sensing.lidar.catalogue import load_catalogue
 from seip_addon.core.sensing.scans.sensor import level_orientation
-from seip_addon.core.sensing.visibility.chunks import compute_rows
+from seip_addon.core.sensing.visibility.grid import seen_from
 from seip_addon.core.sensing.visibility.ray_casting import make_ray_caster
 from seip_addon.core.sensing.visibility.settings import VisibilitySettings
 from seip_addon.core.sensing.visibility.target_index import TargetIndex
@@ -57,9 +57,8 @@ def test_a_level_sensor_sees_what_its_candidate_sees():
     poses = SITE.candidates
     some = np.arange(0, len(poses), max(1, len(poses) // 6))
     looks = visibility_model(SITE, SIGHT, ANY)
-    rows = compute_rows(looks, poses, MODELS, some)
-    grid = np.unpackbits(rows.packed, axis=1, count=len(SITE.targets)).astype(bool)
-    for pose, row in zip(some, grid, strict=True):
+    for pose in some:
+        row = seen_from(looks, poses, MODELS, pose)[0]
         model = MODELS[str(poses.sensor[pose])]
         seen = looks.see(model, poses.xyz[pose], level_orientation(float(poses.yaw[pose])))
         assert (seen == row).all()
