@@ -134,10 +134,10 @@ def test_no_car_drives_on_lanes_that_are_not_for_cars(tmp_path, kind):
 
 
 @needs_sumo
-def test_sumo_s_csv_says_what_its_xml_says(tmp_path, run):
+def test_sumo_s_packed_xml_says_what_its_xml_says(tmp_path, run):
     arguments = ["--net-file", run.net, "--route-files", *run.routes, "--end", 30, "--step-length", 0.1]
     forms = {}
-    for name in ("f.xml", "f.csv", "f.xml.gz"):
+    for name in ("f.xml", "f.xml.gz"):
         more = ["--fcd-output", tmp_path / name, "--precision", 3, "--no-warnings", "true", "--no-step-log", "true"]
         finish(sumo_programs.run(find_sumo(), find_sumo().sumo, [*arguments, *more], "again"))
         forms[name] = finish(read_floating_car_data(tmp_path / name))
