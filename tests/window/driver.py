@@ -156,9 +156,7 @@ class Window:
         from PIL import Image  # noqa: PLC0415  # comes with the extension
 
         self.pictures.mkdir(parents=True, exist_ok=True)
-        pixels = self.pixels()
-        size = (1200, round(1200 * len(pixels) / len(pixels[0])))
-        Image.fromarray(pixels).resize(size).save(self.pictures / f"{name}.png")
+        Image.fromarray(self.pixels()).save(self.pictures / f"{name}.png", optimize=True)
         yield 0.1
 
     def open_section(self, name: str) -> Steps:

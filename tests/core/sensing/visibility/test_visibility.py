@@ -20,7 +20,6 @@ from seip_addon.core.sensing.lidar.catalogue import load_catalogue
 from seip_addon.core.sensing.lidar.model import LidarModel
 from seip_addon.core.sensing.lidar.range_equation import RangeEquation
 from seip_addon.core.sensing.visibility.grid import (
-    PART,
     VisibilityGrid,
     VisibilitySettings,
     compute_visibility,
@@ -329,49 +328,54 @@ def test_settings_that_mean_nothing(values: tuple[float, ...]) -> None:
         VisibilitySettings(*values)
 
 
+class Casting:
+    """Computation of rows that notes the poses and fails after a number of them."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.poses: list[int] = []
+        self.most = 0
+        monkeypatch.setattr("seip_addon.core.sensing.visibility.grid.seen_from", self)
+
+    def __call__(self, *args: Any) -> Any:
+        if len(self.poses) == self.most:
+            raise SeipError("ended")
+        self.poses.append(args[-1])
+        return seen_from(*args)
+
+
 @needs_any
 def test_an_interrupted_run_goes_on_from_its_finished_rows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    site, models, settings = (
-        junction_site(positions=24, heights=[5.0], spacing=4.0),
-        load_catalogue(),
-        VisibilitySettings(),
-    )
-    stored = lambda name: stored_visibility(tmp_path / name, site, models, settings, ANY)  # noqa: E731
-    whole = finish(stored("whole.npz"))
-    steps = stored("grid.npz")
-    while next(steps).done == 0:
-        pass
-    steps.close()
-    part = tmp_path / "grid.part.npz"
-    assert sorted(path.name for path in tmp_path.iterdir()) == [part.name, "whole.npz"]
-    with PART.reading(part) as (_, arrays):
-        finished = arrays["poses"]
-    assert 0 < len(finished) < len(site.candidates)
-    cast = []
-    monkeypatch.setattr(
-        "seip_addon.core.sensing.visibility.grid.seen_from", lambda *args: cast.append(args[-1]) or seen_from(*args)
-    )
-    assert (finish(stored("grid.npz")).packed == whole.packed).all()
-    assert sorted([*cast, *finished.tolist()]) == list(range(len(site.candidates)))
+    site, models, settings = random_site(2), MODELS, VisibilitySettings()
+    stored = lambda name: finish(stored_visibility(tmp_path / name, site, models, settings, ANY, threads=1))  # noqa: E731
+    whole = stored("whole.npz")
+    casting = Casting(monkeypatch)
+    for casting.most in (1, 2):
+        with pytest.raises(SeipError, match="ended"):
+            stored("grid.npz")
+        assert sorted(path.name for path in tmp_path.iterdir()) == ["grid.part.npz", "whole.npz"]
+    casting.most = len(site.candidates)
+    assert (stored("grid.npz").packed == whole.packed).all()
+    assert sorted(casting.poses) == list(range(len(site.candidates)))
     assert (tmp_path / "grid.npz").read_bytes() == (tmp_path / "whole.npz").read_bytes()
     assert sorted(path.name for path in tmp_path.iterdir()) == ["grid.npz", "whole.npz"]
 
 
 @needs_any
-def test_rows_of_other_inputs_or_damaged_ones_are_computed_again(tmp_path: Path) -> None:
-    site, models = random_site(2), MODELS
-    other = replace(VisibilitySettings(), delta=0.5)
-    steps = stored_visibility(tmp_path / "grid.npz", site, models, other, ANY)
-    while next(steps).done == 0:
-        pass
-    steps.close()
-    assert (tmp_path / "grid.part.npz").exists()
-    grid = finish(stored_visibility(tmp_path / "grid.npz", site, models, VisibilitySettings(), ANY))
-    assert (grid.packed == grid_of(site, VisibilitySettings()).packed).all()
-    (tmp_path / "grid.npz").unlink()
-    (tmp_path / "grid.part.npz").write_bytes(b"damaged")
-    again = finish(stored_visibility(tmp_path / "grid.npz", site, models, VisibilitySettings(), ANY))
-    assert (again.packed == grid.packed).all()
+def test_rows_of_other_inputs_or_damaged_ones_are_computed_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    site, path = random_site(2), tmp_path / "grid.npz"
+    whole = grid_of(site, VisibilitySettings())
+    with monkeypatch.context() as patch:
+        Casting(patch).most = 2
+        with pytest.raises(SeipError, match="ended"):
+            finish(stored_visibility(path, site, MODELS, replace(VisibilitySettings(), delta=0.5), ANY, threads=1))
+    part = tmp_path / "grid.part.npz"
+    assert part.exists()
+    for content in (part.read_bytes(), b"damaged"):
+        part.write_bytes(content)
+        assert (finish(stored_visibility(path, site, MODELS, VisibilitySettings(), ANY)).packed == whole.packed).all()
+        path.unlink()
 
 
 @needs_any
