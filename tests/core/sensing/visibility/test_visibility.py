@@ -161,8 +161,10 @@ def test_same_as_the_full_scan_in_a_soup(engine: Engine, seed: int, delta: float
 
 
 @each_engine
-@pytest.mark.parametrize("key", ["type1", pytest.param("type3", marks=pytest.mark.slow), "vls128"])
-def test_same_as_the_full_scan_on_a_junction(engine: Engine, key: str) -> None:
+@pytest.mark.parametrize(
+    ("key", "share"), [("type1", 0.04), pytest.param("type3", 0.03, marks=pytest.mark.slow), ("vls128", 0.03)]
+)
+def test_same_as_the_full_scan_on_a_junction(engine: Engine, key: str, share: float) -> None:
     models = load_catalogue()
     site = junction_site(positions=1, sensors=[key], heights=[5.4])
     caster = make_ray_caster(site.triangles, engine)
@@ -170,7 +172,7 @@ def test_same_as_the_full_scan_on_a_junction(engine: Engine, key: str) -> None:
     full, rays = full_scan(site, models, VisibilitySettings(), caster)
     assert (lazy.visible == full).all()
     assert 0.02 < lazy.visible.mean() < 0.98
-    assert lazy.parameters["rays_cast"] < 0.04 * rays
+    assert lazy.parameters["rays_cast"] < share * rays
 
 
 @pytest.mark.slow
