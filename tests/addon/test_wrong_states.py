@@ -2,27 +2,27 @@
 
 import json
 import re
+import time
 from unittest.mock import MagicMock
 
 import bpy
 import pytest
 
 from seip_addon.core.base.acceptance import Acceptance
-from seip_addon.core.base.progress import Progress
+from seip_addon.core.base.errors import SeipError
+from seip_addon.core.base.progress import Pace, Progress
 from seip_addon.core.choosing.placement.search_limits import SolverLimits
 from seip_addon.core.output.results.answer import sentence
 from seip_addon.core.output.results.placement_record import parsed_record
+from seip_addon.core.sensing.lidar.catalogue import load_catalogue
+from seip_addon.core.sensing.visibility.grid import compute_visibility
+from seip_addon.core.sensing.visibility.settings import VisibilitySettings
 from seip_addon.panel import placement as placement_panel
 from seip_addon.panel import preferences, scene_status, work
 from seip_addon.panel.layout import draw_run
 from seip_addon.panel.session import RunningWork, session
 from tests.builders.drawn_layout import DrawnLayout
-
-
-@pytest.fixture
-def placed(junction):
-    bpy.ops.seip.solve_placement()
-    return junction
+from tests.builders.synthetic_junction import junction_site
 
 
 @pytest.fixture
@@ -119,3 +119,41 @@ def test_progress_in_the_sidebar_names_phase_value_gap_and_time(add_on, monkeypa
     assert layout.bars == [(0.0, "8 s elapsed")]
     assert layout.text == "Improving the placement: 71% of the road, gap at most 5.2%"
     assert [name for name, _ in layout.operators] == ["seip.accept", "seip.stop"]
+
+
+SITE = junction_site(positions=80, heights=[4.0, 6.0, 8.0], spacing=1.0)
+MODELS = load_catalogue()
+
+
+def test_an_error_comes_back():
+    def failing():
+        yield Progress(0, 1, "fail")
+        raise SeipError("no")
+
+    work = RunningWork("", failing())
+    with pytest.raises(SeipError, match="no"):
+        work.result()
+
+
+def test_the_pace_tells_how_long_it_takes_still():
+    pace = Pace()
+    pace.note(Progress(0, 0, "set up"), 0.0)
+    assert pace.seconds_left is None
+    pace.note(Progress(10, 100, "rays"), 50.0)
+    assert pace.seconds_left is None
+    pace.note(Progress(40, 100, "rays"), 56.0)
+    assert pace.seconds_left == pytest.approx(12.0)
+
+
+@pytest.mark.parametrize("engine", ["bvh", "auto"])
+def test_stopped_visibility_ends_soon(engine):
+    if engine == "bvh":
+        pytest.importorskip("bpy")
+    work = RunningWork("", compute_visibility(SITE, MODELS, VisibilitySettings(), engine))
+    while not work.progress.total:
+        time.sleep(0.01)
+    time.sleep(0.2)
+    work.stop()
+    began = time.perf_counter()
+    assert work.join(5.0)
+    assert time.perf_counter() - began < 0.5

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from statistics import NormalDist
 from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from seip_addon.core.base.errors import SeipError
 from seip_addon.core.sensing.lidar.carla_dropoff import CarlaDropoff
@@ -15,6 +18,7 @@ from seip_addon.core.sensing.lidar.catalogue import load_catalogue
 from seip_addon.core.sensing.lidar.model import LidarModel
 from seip_addon.core.sensing.lidar.noisy_returns import measured_returns, return_chance
 from seip_addon.core.sensing.lidar.range_equation import RangeEquation
+from tests.builders.traffic_by_hand import make_model
 from tests.oracles.full_scan import beam_directions
 
 CATALOGUE = load_catalogue()
@@ -122,55 +126,33 @@ def test_a_law_follows_from_published_ranges_or_is_assumed_and_said_to_be(tmp_pa
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"price_usd": None}, "price_usd is missing"),
         ({"channels": None}, "channels is missing"),
         ({"chanels": "4"}, "chanels"),
-        ({"channels": "1"}, "channels"),
-        ({"channels": "4.5"}, "channels"),
         ({"channels": "true"}, "channels"),
         ({"field_of_view_deg": "[2.0, -10.0]"}, "increasing"),
-        ({"field_of_view_deg": "[-10.0]"}, "2 numbers"),
-        ({"field_of_view_deg": "[nan, 2.0]"}, "increasing"),
         ({"field_of_view_deg": "[-90.0, 2.0]"}, "an elevation is -90, not -89.999 to 89.999 degrees"),
         ({"channels": None, "field_of_view_deg": None, "elevations_deg": "[]"}, "channel"),
-        ({"channels": None, "field_of_view_deg": None, "elevations_deg": "[1.0, nan]"}, "an elevation is nan, not"),
         ({"channels": None, "field_of_view_deg": None, "elevations_deg": '["up"]'}, "numbers"),
         ({"elevations_deg": "[1.0]"}, "channels, field_of_view_deg"),
         ({"azimuth_offsets_deg": "[1.0]"}, "offset"),
-        ({"azimuth_offsets_deg": "[1.0, 2.0, inf, 4.0]"}, "offset"),
-        *(
-            ({"horizontal_field_of_view_deg": view}, "the horizontal field of view is .*, not 0.001 to 360 degrees")
-            for view in ("0", "-90.0", "360.1", "nan")
-        ),
+        ({"horizontal_field_of_view_deg": "360.1"}, "the horizontal field of view is .*, not 0.001 to 360 degrees"),
         ({"horizontal_field_of_view_deg": "[-60.0, 60.0]"}, "horizontal_field_of_view_deg must be a number"),
         ({"clockwise": '"yes"'}, "clockwise must be true or false"),
-        ({"clockwise": "1"}, "clockwise must be true or false"),
         ({"range_m": "[50.0, 50.0]"}, "range"),
-        ({"range_m": "[-1.0, 50.0]"}, "range"),
         ({"range_m": "[0.0, inf]"}, "range"),
         ({"points_per_second": "0"}, "points per second"),
-        ({"points_per_second": "nan"}, "points per second"),
         ({"rotation_rate_hz": "-5"}, "rotation"),
-        ({"rotation_rate_hz": '"fast"'}, "rotation_rate_hz"),
         ({"price_usd": "[3000, 1000]"}, "price"),
-        ({"price_usd": "[0, 1000]"}, "price"),
         ({"price_usd": "[1000, 2e9]"}, r"its price is 2e\+09, not 0 to 1e\+09 USD"),
-        ({"range_noise_std_m": "-0.1"}, "noise"),
         ({"attenuation_per_m": "nan"}, "attenuation"),
         ({"dropoff_general_rate": "1.5"}, "drop-off"),
-        ({"dropoff_zero_intensity": "-1"}, "drop-off"),
-        ({"dropoff_intensity_limit": "0"}, "drop-off"),
         ({"model": '"optics"'}, "model must be one of 'range equation', 'carla', not 'optics'"),
         ({"model": '"carla"', "detection_range_m": "[9.0, 20.0]"}, 'not a figure of the model "carla"'),
-        ({"model": '"range equation"', "attenuation_per_m": "0.1"}, 'not a figure of the model "range equation"'),
-        ({"detection_range_m": "[9.0, 20.0]", "dropoff_general_rate": "0.1"}, 'not a figure of the model "carla"'),
         ({"detection_range_m": "[20.0, 9.0]"}, "the range at 80 % reflectivity"),
-        ({"detection_range_m": "[9.0, 8.0, 7.0]"}, "the range at 10 % reflectivity, and that at 80 %"),
         ({"detection_probability": "0.999"}, "a probability of detection"),
+        ({"detection_range_m": "[9.0, 8.0, 7.0]"}, "the range at 10 % reflectivity, and that at 80 %"),
         ({"detection_law": "[-11.0, 0.9]"}, "3 numbers"),
-        ({"detection_law": "[-11.0, 0.0, 0.9]"}, "the spread of detection"),
         ({"detection_law": "[-11.0, 0.9, 1.1]"}, "the ceiling of detection"),
-        ({"detection_law": "[nan, 0.9, 0.9]"}, "the threshold of detection"),
         ({"detection_law": "[-11.0, 0.9, 0.9]", "detection_probability": "0.5"}, "either detection_law"),
         ({"range_noise_growth_per_m": "-1"}, "growth of the range noise"),
         ({"range_noise_std_m": "1e300"}, r"the range noise is 1e\+300, not 0 to 10 m"),
@@ -211,18 +193,9 @@ def test_intensity_falls_with_range_and_incidence() -> None:
 
 
 def sensor(**changes: Any) -> LidarModel:
-    return LidarModel(
-        key="test",
-        name="Test",
-        manufacturer="Test",
-        source="Test",
-        elevations=np.array([0.0, -0.1]),
-        min_range=1.0,
-        max_range=100.0,
-        points_per_second=2000.0,
-        rotation_rate=10.0,
-        price_range=(1.0, 2.0),
-        **changes,
+    return make_model(
+        **{"elevations": np.array([0.0, -0.1]), "min_range": 1.0, "points_per_second": 2000.0, "law": CarlaDropoff()}
+        | changes
     )
 
 
@@ -266,3 +239,54 @@ def test_the_documented_example_is_a_catalogue(tmp_path: Path) -> None:
 def test_the_documentation_names_every_sensor() -> None:
     text = (Path(__file__).resolve().parents[4] / "docs" / "sensors.md").read_text(encoding="utf-8")
     assert all(f"| `{key}` |" in text for key in load_catalogue())
+
+
+laws = st.builds(
+    RangeEquation,
+    threshold=st.floats(-16.0, -6.0),
+    spread=st.floats(0.2, 2.0),
+    ceiling=st.floats(0.8, 1.0),
+    extinction=st.floats(0.0, 0.05),
+)
+
+
+@given(at_10=st.floats(1.0, 200.0), more=st.floats(1.3, 4.0), probability=st.floats(0.05, 0.95))
+def test_ranges_of_the_data_sheet_come_out_again(at_10, more, probability):
+    law = RangeEquation.of_ranges(at_10, at_10 * more, probability)
+    assert law.reach(0.1, probability) == pytest.approx(at_10, rel=1e-9)
+    if more <= math.sqrt(8.0):  # else the ranges contradict 1/r², and the shorter one counts
+        assert law.reach(0.8, probability) == pytest.approx(at_10 * more, rel=1e-9)
+    else:
+        assert law.extinction == 0.0
+
+
+@given(law=laws, distance=st.floats(0.1, 500.0), cos=st.floats(-1.0, 1.0), reflectivity=st.floats(0.001, 1.0))
+def test_probability_is_the_formula(law, distance, cos, reflectivity):
+    found = law.chance(np.array([distance]), np.array([abs(cos) * reflectivity]))[0]
+    power = abs(cos) * reflectivity * math.exp(-2 * law.extinction * distance) / distance**2
+    exact = 0.0 if power == 0.0 else NormalDist(law.threshold, law.spread).cdf(math.log(power)) * law.ceiling
+    assert found == pytest.approx(exact, abs=2e-7)
+
+
+def test_light_lost_in_air_shortens_the_range():
+    clear = RangeEquation.of_ranges(40.0, 110.0)
+    assert clear.in_air(0.01).reach(0.1, 0.9) < 30.0 < clear.reach(0.1, 0.9)
+
+
+@given(law=laws)
+def test_the_drop_off_in_its_place_is_right_at_two_ranges(law):
+    near, far = (law.reach(0.2, share * law.ceiling) for share in (0.9, 0.5))
+    exact = law.chance(np.array([near, far]), np.full(2, 0.2))
+    dropoff = law.as_dropoff()
+    if dropoff.intensity_limit < 1.0:
+        # CARLA's own intensity knows the range alone
+        assert dropoff.chance(np.array([near, far]), np.ones(2)) == pytest.approx(exact, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("at_10", "at_80"),
+    [(0.0, 9.0), (9.0, 9.0), (9.0, 4.0), (9.0, 9.1), (math.nan, 1.0), (1.0, math.inf), (1e200, 1e250), (1e-9, 1.0)],
+)
+def test_ranges_that_contradict_each_other_are_refused(at_10, at_80):
+    with pytest.raises(SeipError, match="the range at 80 % reflectivity"):
+        RangeEquation.of_ranges(at_10, at_80)

@@ -1,11 +1,16 @@
 """Rings are where the beams meet the road."""
 
+from __future__ import annotations
+
 import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
+from seip_addon.core.sensing.lidar.azimuth_steps import steps_in_arcs
 from seip_addon.core.sensing.lidar.catalogue import load_catalogue
 from seip_addon.core.sensing.lidar.rings import beam_rings
 
@@ -46,3 +51,24 @@ def test_rings_and_cone_end_at_the_borders_of_a_limited_field_of_view():
         azimuth = np.degrees(np.arctan2(ends[:, 1], ends[:, 0]))
         assert (azimuth.min(), azimuth.max()) == pytest.approx((-across, across), abs=1e-9)
     assert np.linalg.norm(np.diff(drawn.rings, axis=1), axis=-1).max() < 2.0
+
+
+VIEWS = st.one_of(st.sampled_from([math.tau, math.pi, math.radians(359.9), math.radians(1)]), st.floats(0.02, math.tau))
+
+
+@given(VIEWS, st.integers(1, 200), st.integers(0, 2**32 - 1))
+def test_the_steps_of_arcs_are_found_each_once(view: float, count: int, seed: int) -> None:
+    random = np.random.default_rng(seed)
+    middle, half = random.uniform(-12, 12, 40), random.choice([0.01, 0.4, 3.1, math.pi, 4.0], 40) * random.random(40)
+    half[:3] = math.pi, math.pi - 1e-9, math.pi + 1e-9
+    size = view / count
+    arc, first, width = steps_in_arcs(middle, half, size, count, all_round=view == math.tau)
+    assert (np.diff(arc) >= 0).all()
+    assert (width > 0).all()
+    for number in range(40):
+        rows = [range(f, f + w) for f, w in zip(first[arc == number], width[arc == number], strict=True)]
+        found = [step % count if view == math.tau else step for row in rows for step in row]
+        away = [abs(math.remainder(step * size - middle[number], math.tau)) - half[number] for step in range(count)]
+        assert len(found) == len(set(found))
+        assert {step for step in range(count) if away[step] < -1e-12} <= set(found)
+        assert set(found) <= {step for step in range(count) if away[step] < 1e-12}

@@ -8,31 +8,26 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from seip_addon.core.sensing.lidar.catalogue import load_catalogue
-from seip_addon.core.sensing.lidar.model import LidarModel
 from seip_addon.core.sensing.lidar.range_equation import RangeEquation
 from seip_addon.core.sensing.returns.bodies import PANELS
 from seip_addon.core.sensing.returns.expected_returns import upright_returns
+from seip_addon.core.sensing.returns.occlusion import HIDING, clear_chance, returns_in_traffic
 from seip_addon.core.sensing.returns.road_users import BODIES, RoadUsers
 from seip_addon.core.sensing.traffic import vehicle_types
 from seip_addon.core.sensing.traffic.bodies import fitted_body
 from seip_addon.core.sensing.traffic.trajectories import RoadUser
 from seip_addon.core.sensing.visibility.ray_casting import make_ray_caster
+from tests.builders.traffic_by_hand import make_model
 
 
 def model_of(elevations_deg, steps, offsets=None, view=360.0, most=60.0):
-    return LidarModel(
-        key="few",
-        name="Few rays",
-        manufacturer="",
-        source="",
+    return make_model(
         elevations=np.radians(elevations_deg),
         azimuth_offsets=np.zeros(0) if offsets is None else np.radians(offsets),
         field_of_view=math.radians(view),
         min_range=0.5,
         max_range=most,
         points_per_second=10.0 * steps * len(elevations_deg),
-        rotation_rate=10.0,
-        price_range=(1.0, 1.0),
         law=RangeEquation.of_ranges(30.0, 80.0),
     )
 
@@ -179,3 +174,38 @@ def test_panels_have_the_silhouette_and_the_reflection_of_the_bodies_that_scans_
     assert panel.height == kind.height
     assert panel.width * panel.height == pytest.approx(np.mean(areas), rel=0.04)
     assert panel.reflected == pytest.approx(np.mean(reflected), rel=0.04)
+
+
+def clear_share(sensor, user, body, draws, random):
+    """Share of draws in which no obstacle of a Poisson process, as high as a car, stands above the line of sight."""
+    middle = user + np.array([0.0, 0.0, PANELS[BODIES[body]].height / 2])
+    far = math.hypot(*(sensor - user)[:2])
+    clear = 0
+    for _ in range(draws):
+        obstacles = random.uniform(0.0, far, random.poisson(HIDING * far)) / max(far, 1e-9)
+        line = middle[2] + obstacles * (sensor[2] - middle[2])
+        clear += not (line < user[2] + PANELS["car"].height).any()
+    return clear / draws
+
+
+@pytest.mark.parametrize("height", [0.4, 1.2, 1.6, 3.5, 8.0])
+@pytest.mark.parametrize("body", range(len(BODIES)))
+def test_chance_is_the_share_of_random_traffic_that_leaves_the_view_free(height, body):
+    random = np.random.default_rng(7)
+    sensor = np.array([3.0, -2.0, 5.0 + height])
+    points = [[3.0, -1.0, 5.0], [15.0, 4.0, 5.0], [-30.0, 20.0, 5.0]]
+    found = clear_chance(sensor, users_at(points, [body] * len(points)))
+    draws = 4000
+    for chance, point in zip(found, points, strict=True):
+        share = clear_share(sensor, np.array(point), body, draws, random)
+        assert share == pytest.approx(chance, abs=4 * math.sqrt(chance * (1 - chance) / draws) + 1e-3)
+
+
+def test_returns_in_traffic_are_those_in_plain_view_times_the_chance():
+    random = np.random.default_rng(3)
+    users = users_at(random.uniform(-60, 60, (20, 3)), random.integers(0, 3, 20))
+    origins, returns = random.uniform(-20, 20, (4, 3)), random.gamma(1.0, 50.0, (4, 20)).astype(np.float32)
+    found = returns_in_traffic(returns, origins, users)
+    assert found.dtype == np.float32
+    expected = [each * clear_chance(origin, users) for each, origin in zip(returns, origins, strict=True)]
+    np.testing.assert_allclose(found, expected, rtol=1e-6)

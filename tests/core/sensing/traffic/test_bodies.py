@@ -1,3 +1,5 @@
+from headless.studies.random_sites.varied_bodies import SHAPES, draw_shape
+
 import numpy as np
 import pytest
 from hypothesis import example, given
@@ -30,15 +32,6 @@ USUAL = {
     "SUMO's own pedestrian": ("pedestrian", 0.215, 0.478, 1.719),
 }
 usual = pytest.mark.parametrize("user", [RoadUser(name, *given) for name, given in USUAL.items()], ids=list(USUAL))
-any_user = st.builds(
-    RoadUser,
-    st.just("u"),
-    st.sampled_from(CATEGORIES),
-    st.floats(0.1, 30.0),
-    st.floats(0.1, 4.0),
-    st.floats(0.2, 5.0),
-    st.floats(0.0, 1.0),
-)
 
 
 def parts(triangles):
@@ -88,35 +81,6 @@ def first_hit(triangles, start, direction):
     return int(np.argmin(np.where(met, distance, np.inf))) if met.any() else None
 
 
-def skyline(triangles, length, count=24):
-    """Greatest height over each slice of the length."""
-    steps = np.linspace(0.0, 1.0, 12)
-    weights = np.array([(u, v, 1 - u - v) for u in steps for v in steps if u + v <= 1 + 1e-12])
-    dense = np.einsum("wk,nkd->nwd", weights, triangles).reshape(-1, 3)
-    slot = np.clip(((dense[:, 0] / length + 0.5) * count).astype(int), 0, count - 1)
-    top = np.zeros(count)
-    np.maximum.at(top, slot, dense[:, 2])
-    return top
-
-
-@given(any_user)
-@example(RoadUser("u", "car", 4.5, 1.8, 1.5))
-def test_the_bounding_box_is_exactly_the_size(user):
-    triangles = fitted_body(user).triangles
-    assert triangles.min(axis=(0, 1)).tolist() == [-user.length / 2, -user.width / 2, 0.0]
-    assert triangles.max(axis=(0, 1)).tolist() == [user.length / 2, user.width / 2, user.height]
-
-
-@pytest.mark.parametrize("path", sorted(MESHES.glob("*.obj")), ids=lambda path: path.stem)
-def test_every_part_of_a_mesh_is_closed_and_turned_outwards(path):
-    triangles, _ = read_mesh(path)
-    assert path.name.split(".")[0] in CATEGORIES
-    directed = edges(triangles)
-    assert len(set(directed)) == len(directed)
-    assert {(b, a) for a, b in directed} == set(directed)
-    assert all(signed_volume(triangles[part]) > 0 for part in parts(triangles))
-
-
 TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nusemtl {material}\nf 1 3 2\nf 1/1/1 2/2/2 4/3/3\nf 2 3 4\nf 1 4 3\n"
 
 
@@ -134,16 +98,6 @@ def test_a_body_has_few_triangles_and_none_without_area(user):
     assert 60 <= len(body) <= 300
     assert areas(body.triangles).min() > 1e-4
     assert len(body) == len(body.reflectivity) == len(body.material)
-
-
-def test_a_truck_has_a_gap_between_tractor_and_trailer_alone():
-    def gap(name):
-        user = RoadUser(name, *USUAL[name])
-        top = skyline(fitted_body(user).triangles, user.length, 200) / user.height
-        return top[140:190].min()
-
-    assert gap("semi-trailer") < 0.35
-    assert gap("rigid truck") < 0.4  # a slit, 18 cm wide
 
 
 @pytest.mark.parametrize(
@@ -199,3 +153,53 @@ def test_paint_and_clothes_have_the_users_reflectivity(user):
 def test_no_size_is_one_sentence(size):
     with pytest.raises(SeipError, match=r"road user 'a' is .* m large; give its type"):
         fitted_body(RoadUser("a", "car", *size))
+
+
+within_range = st.sampled_from(CATEGORIES).flatmap(
+    lambda category: st.builds(
+        RoadUser,
+        st.just("u"),
+        st.just(category),
+        st.floats(0.4, 20.0),
+        st.floats(0.4, 3.0),
+        st.floats(0.8, 4.0),
+        st.just(0.5),
+        st.tuples(*(st.floats(-most, most) for most in SHAPES[category])),
+    )
+)
+
+
+@given(within_range)
+@example(RoadUser("u", "car", 4.5, 1.8, 1.5))
+def test_a_shaped_body_fills_its_box_exactly(user):
+    triangles = fitted_body(user).triangles
+    assert triangles.min(axis=(0, 1)).tolist() == [-user.length / 2, -user.width / 2, 0.0]
+    assert triangles.max(axis=(0, 1)).tolist() == [user.length / 2, user.width / 2, user.height]
+
+
+@pytest.mark.parametrize("path", sorted(MESHES.glob("*.obj")), ids=lambda path: path.stem)
+def test_shaped_meshes_stay_closed_turned_outwards_and_their_panes_in_front(path):
+    plain, _ = read_mesh(path)
+    category, random = path.name.split(".")[0], np.random.default_rng(5)
+    length, width, height = np.ptp(plain, axis=(0, 1)).tolist()
+    own = fitted_body(RoadUser("u", category, length, width, height)).triangles
+    before = np.cross(own[:, 1] - own[:, 0], own[:, 2] - own[:, 0])
+    directed = edges(own)
+    buried = panes = 0
+    for _ in range(4):
+        shape = draw_shape(category, random)
+        triangles = fitted_body(RoadUser("u", category, length, width, height, shape=shape)).triangles
+        assert len(edges(triangles)) == len(directed) == len(set(edges(triangles)))
+        assert {(b, a) for a, b in edges(triangles)} == set(edges(triangles))
+        after = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+        turned = np.einsum("ij,ij->i", before, after) / np.linalg.norm(before, axis=1) / np.linalg.norm(after, axis=1)
+        assert turned.min() > 0.9  # no face has turned by 26° or more
+        assert areas(triangles).min() > 1e-4
+        for part in parts(triangles):
+            assert signed_volume(triangles[part]) > 0
+            for front in part[:2] if len(part) == 6 else ():
+                a, b, c = triangles[front]
+                normal = np.cross(b - a, c - a) / np.linalg.norm(np.cross(b - a, c - a))
+                panes += 1
+                buried += first_hit(triangles, (a + b + c) / 3 + 0.05 * normal, -normal) != front
+    assert buried <= 0.02 * panes

@@ -9,7 +9,7 @@ import pytest
 
 from seip_addon.core.base.errors import SeipError
 from seip_addon.core.sensing.traffic.run_overlap import overlap_of, require_independent, vehicle_positions
-from seip_addon.core.sensing.traffic.trajectories import Trajectories
+from seip_addon.core.sensing.traffic.trajectories import Trajectories, parked_users
 from tests.builders.traffic_by_hand import make_trajectories
 
 SHIPPED = Path(__file__).parents[4] / "scenes"
@@ -59,3 +59,20 @@ def test_the_share_is_that_of_the_vehicles_within_a_metre():
 
     one, other = make_trajectories(*standing(0, 10, 20, 30)), make_trajectories(*standing(0.9, 11.1, 50))
     assert shares(one, other) == [pytest.approx(1 / 3)]  # of the other's three; of the four a quarter
+
+
+def standing(x, begin=0.0, end=40.0):
+    return [(begin, x, 0.0, 0.0, 0.0, 0.0), (end, x, 0.0, 0.0, 0.0, 0.0)]
+
+
+def test_who_stands_in_all_of_a_run_is_parked_and_who_waits_is_not():
+    waits = [(0.0, 20.0, 0.0, 0.0, 0.0, 0.0), (35.0, 20.0, 0.0, 0.0, 0.0, 0.0), (40.0, 30.0, 0.0, 0.0, 0.0, 0.0)]
+    drives = [(0.0, 50.0, 0.0, 0.0, 0.0, 0.0), (40.0, 400.0, 0.0, 0.0, 0.0, 0.0)]
+    run = make_trajectories(standing(0.0), waits, drives, standing(60.0, 0.0, 39.0), standing(70.0, 2.0))
+    assert parked_users(run).tolist() == [True, False, False, False, False]
+
+
+def test_a_circle_is_no_standing():
+    turn = np.linspace(0.0, 2.0 * np.pi, 9)
+    circles = [(5.0 * n, 3 * np.cos(t), 3 * np.sin(t), 0.0, 0.0, 0.0) for n, t in enumerate(turn)]
+    assert parked_users(make_trajectories(circles, standing(50.0))).tolist() == [False, True]

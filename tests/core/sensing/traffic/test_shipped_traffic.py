@@ -10,7 +10,7 @@ import pytest
 from seip_addon.core.base.progress import finish
 from seip_addon.core.sensing.traffic.overlaps import find_overlaps
 from seip_addon.core.sensing.traffic.road_fit import fit_to_road
-from seip_addon.core.sensing.traffic.trajectories import CATEGORIES, Trajectories
+from seip_addon.core.sensing.traffic.trajectories import Trajectories
 from seip_addon.core.site.scene_geometry import joined
 from seip_addon.scene.blend_file import open_blend
 from seip_addon.scene.read import read_scene
@@ -33,14 +33,6 @@ def geometries():
 @pytest.fixture(params=RUNS, ids=lambda path: f"{path.parent.name}-{path.stem}")
 def run(request):
     return request.param
-
-
-@pytest.mark.parametrize("folder", FOLDERS, ids=lambda path: path.name)
-def test_there_are_all_kinds_of_road_users(folder):
-    runs = [Trajectories.load(path) for path in folder.glob("*.npz")]
-    kinds = [{user.category for user in run.users} for run in runs]
-    for category in CATEGORIES:
-        assert sum(category in kind for kind in kinds) >= 0.75 * len(runs)
 
 
 @pytest.mark.parametrize("folder", FOLDERS, ids=lambda path: path.name)

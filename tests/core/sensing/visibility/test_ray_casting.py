@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from concurrent.futures import ThreadPoolExecutor
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -12,6 +10,7 @@ from hypothesis import strategies as st
 from seip_addon.core.base.errors import SeipError
 from seip_addon.core.sensing.visibility.ray_casting import BvhRayCaster, EmbreeRayCaster, make_ray_caster
 from seip_addon.core.sensing.visibility.settings import Engine
+from seip_addon.core.sensing.visibility.target_index import TargetIndex
 from tests.engines import each_engine
 from tests.oracles.float64_rays import first_hits
 
@@ -34,13 +33,6 @@ def test_hit_miss_and_reach(engine: Engine) -> None:
     assert triangle.tolist() == [0, -1]
     distance, triangle = caster.cast(np.zeros(3), towards_corner[None], 5.0)
     assert (distance[0], triangle[0]) == (np.inf, -1)
-
-
-@each_engine
-def test_both_sides_stop_a_ray(engine: Engine) -> None:
-    caster = make_ray_caster(SQUARE, engine)
-    assert caster.cast(np.array([0.1, 0.2, 9.0]), -UP, 100.0)[0][0] == pytest.approx(4)
-    assert caster.cast(np.array([0.1, 0.2, 0.0]), UP, 100.0)[0][0] == pytest.approx(5)
 
 
 @each_engine
@@ -70,24 +62,16 @@ def test_hits_are_those_of_float64_arithmetic(engine: Engine, seed: int) -> None
 
 
 @each_engine
-def test_a_rays_result_does_not_depend_on_its_company(engine: Engine) -> None:
-    random = np.random.default_rng(5)
-    triangles = random.uniform(-20, 20, (500, 1, 3)) + random.normal(0, 2, (500, 3, 3))
-    rays = unit(random, 1000)
-    caster = make_ray_caster(triangles, engine)
-    whole = caster.cast(np.zeros(3), rays, 100.0)
-    pick = random.permutation(1000)[:137]
-    part = caster.cast(np.zeros(3), rays[pick], 100.0)
-    assert (part[0] == whole[0][pick]).all()
-    assert (part[1] == whole[1][pick]).all()
-
-
-@each_engine
-def test_a_hit_is_the_same_whatever_else_is_kept_and_however_far_the_ray_goes(engine: Engine) -> None:
+def test_a_hit_is_the_same_whatever_else_is_cast_or_kept_and_however_far_the_ray_goes(engine: Engine) -> None:
     random = np.random.default_rng(6)
     triangles = random.uniform(-20, 20, (500, 1, 3)) + random.normal(0, 2, (500, 3, 3))
     rays = unit(random, 1000)
-    distance, triangle = make_ray_caster(triangles, engine).cast(np.zeros(3), rays, 100.0)
+    caster = make_ray_caster(triangles, engine)
+    distance, triangle = caster.cast(np.zeros(3), rays, 100.0)
+    pick = random.permutation(1000)[:137]
+    part = caster.cast(np.zeros(3), rays[pick], 100.0)
+    assert (part[0] == distance[pick]).all()
+    assert (part[1] == triangle[pick]).all()
     keep = random.random(500) < 0.5
     fewer = make_ray_caster(triangles, engine, keep).cast(np.zeros(3), rays, 100.0)
     same = (triangle >= 0) & keep[triangle]
@@ -95,23 +79,36 @@ def test_a_hit_is_the_same_whatever_else_is_kept_and_however_far_the_ray_goes(en
     assert (fewer[1][same] == triangle[same]).all()
     assert keep[fewer[1][fewer[1] >= 0]].all()
     reach = float(np.median(distance[triangle >= 0]))
-    short = make_ray_caster(triangles, engine).cast(np.zeros(3), rays, reach)
+    short = caster.cast(np.zeros(3), rays, reach)
     assert (short[0] == np.where(distance <= reach, distance, np.inf)).all()
-
-
-@each_engine
-def test_threads_cast_alike(engine: Engine) -> None:
-    random = np.random.default_rng(7)
-    caster = make_ray_caster(random.uniform(-20, 20, (500, 1, 3)) + random.normal(0, 2, (500, 3, 3)), engine)
-    batches = [unit(random, 500) for _ in range(20)]
-    alone = [caster.cast(np.zeros(3), rays, 100.0) for rays in batches]
-    with ThreadPoolExecutor(4) as pool:
-        together = list(pool.map(lambda rays: caster.cast(np.zeros(3), rays, 100.0), batches))
-    for one, other in zip(alone, together, strict=True):
-        assert (one[0] == other[0]).all()
-        assert (one[1] == other[1]).all()
 
 
 def test_an_unknown_engine_names_the_known() -> None:
     with pytest.raises(SeipError, match="auto, bvh or embree"):
         make_ray_caster(SQUARE, "optix")  # type: ignore[arg-type]
+
+
+def test_the_distance_is_strictly_less() -> None:
+    index = TargetIndex(np.array([[0.0, 0.0, 0.0]]), 1.0)
+    assert index.pairs_within_delta(np.array([[1.0, 0.0, 0.0]]))[1].tolist() == []
+    assert index.pairs_within_delta(np.array([[np.nextafter(1.0, 0.0), 0.0, 0.0]]))[1].tolist() == [0]
+    assert index.pairs_within_delta(np.array([[0.0, 0.0, 2.0]]))[1].tolist() == []
+
+
+@given(
+    st.integers(0, 2**32 - 1),
+    st.integers(1, 40),
+    st.integers(0, 60),
+    st.floats(1e-3, 8),
+    st.sampled_from([0.0, 5e6]),
+)
+def test_pairs_are_all_that_are_near(seed: int, targets: int, points: int, delta: float, shift: float) -> None:
+    random = np.random.default_rng(seed)
+    xyz, returns = random.uniform(-5, 5, (targets, 3)) + shift, random.uniform(-8, 8, (points, 3)) + shift
+    gap = returns[:, None] - xyz[None]
+    squared = gap[:, :, 0] ** 2 + gap[:, :, 1] ** 2 + gap[:, :, 2] ** 2
+    point, target = TargetIndex(xyz, delta).pairs_within_delta(returns)
+    assert (
+        sorted(map(list, zip(point.tolist(), target.tolist(), strict=True))) == np.argwhere(squared < delta**2).tolist()
+    )
+    assert (np.diff(point) >= 0).all()

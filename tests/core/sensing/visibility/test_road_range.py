@@ -1,9 +1,12 @@
 """Ranges on the road: the law on a level road, and the share of a region that lies beyond."""
 
+from __future__ import annotations
+
 from dataclasses import replace
 
 import numpy as np
 import pytest
+import shapely
 
 from seip_addon.core.sensing.lidar.catalogue import load_catalogue
 from seip_addon.core.sensing.lidar.range_equation import RangeEquation
@@ -15,7 +18,8 @@ from seip_addon.core.sensing.visibility.road_range import (
 from seip_addon.core.sensing.visibility.settings import VisibilitySettings
 from seip_addon.core.sensing.weather import Weather
 from seip_addon.core.site.candidates import CandidateSettings
-from seip_addon.core.workflows.survey import carla_warnings
+from seip_addon.core.site.scene_geometry import Mesh, Pole, SceneGeometry
+from seip_addon.core.workflows.survey import carla_warnings, grid_key, lay_out
 from seip_addon.core.workflows.survey_settings import SurveySettings
 from tests.builders.synthetic_junction import junction_site
 
@@ -67,3 +71,32 @@ def test_sensors_that_see_through_any_weather_are_named():
     assert "do not compare the two" not in warning
     (warning,) = carla_warnings(models, alike)
     assert warning.endswith("os1_128 must detect it: do not compare the two")
+
+
+def geometry(triangles: np.ndarray, *strays: Mesh) -> SceneGeometry:
+    road = Mesh("carriageway", triangles)
+    region = shapely.box(*triangles.min(axis=(0, 1))[:2], *triangles.max(axis=(0, 1))[:2])
+    pole = Pole("pole", np.array([0.0, 6.0, 0.0]))
+    return SceneGeometry("street", np.zeros(3), (road,), (), strays, region, poles=(pole,))
+
+
+GROUND = np.array([[[-20.0, -4, 0], [20, -4, 0], [20, 4, 0]], [[-20, -4, 0], [20, 4, 0], [-20, 4, 0]]])
+
+
+def moved(x: float, y: float) -> np.ndarray:
+    return GROUND + np.array([x, y, 0.0])
+
+
+SHORT = SurveySettings(candidates=CandidateSettings(sensors=("type3",), heights=(5.4,), setback=0.5))
+
+
+def test_what_was_forgotten_far_away_changes_nothing_and_is_named() -> None:
+    plain = lay_out(geometry(GROUND), SHORT)
+    stray = lay_out(geometry(GROUND, Mesh("left behind", moved(5e5, 0)), Mesh("another", moved(0, 400))), SHORT)
+    np.testing.assert_array_equal(stray.site.triangles, plain.site.triangles)
+    assert grid_key(stray) == grid_key(plain)
+    (warning,) = set(stray.warnings) - set(plain.warnings)
+    assert "4 triangles of 2 objects lie beyond every sensor's range of 301 m" in warning
+    assert "'left behind'" in warning
+    assert "499,9" in warning
+    assert "wide" not in warning

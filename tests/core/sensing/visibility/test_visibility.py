@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -16,6 +17,7 @@ from shapely import box
 
 from seip_addon.core.base.errors import SeipError
 from seip_addon.core.base.progress import finish
+from seip_addon.core.sensing.lidar.carla_dropoff import CarlaDropoff
 from seip_addon.core.sensing.lidar.catalogue import load_catalogue
 from seip_addon.core.sensing.lidar.model import LidarModel
 from seip_addon.core.sensing.lidar.range_equation import RangeEquation
@@ -32,29 +34,27 @@ from seip_addon.core.sensing.visibility.ring_resolution import resolution_warnin
 from seip_addon.core.sensing.visibility.settings import Engine
 from seip_addon.core.site.site import Site, Targets
 from tests.builders.synthetic_junction import junction_site, make_candidates, prism, rectangle, varied_reflectivity
+from tests.builders.traffic_by_hand import make_model
 from tests.engines import ANY, each_engine, needs_any
 from tests.oracles.float64_rays import nearest_return
 from tests.oracles.full_scan import full_scan
 from tests.oracles.random_cases import cases
+from tests.oracles.visibility_search import FAULTS, assess, draw_case, search, sentence
 
 Float = NDArray[np.float64]
 
 
-def small_model(key: str, channels: int = 12, steps: int = 90, **changes: Any) -> LidarModel:
+def small_model(key: str, channels: int, steps: int) -> LidarModel:
     """A sensor small enough for brute force, with uneven elevations and azimuth offsets."""
     place = np.linspace(0, 1, channels)
-    values = {"min_range": 0.5, "max_range": 40.0} | changes
-    return LidarModel(
+    return make_model(
         key=key,
-        name=key,
-        manufacturer="test",
-        source="test",
         elevations=np.radians(6 - 60 * place**1.3),
+        min_range=0.5,
+        max_range=40.0,
         points_per_second=10.0 * channels * steps,
-        rotation_rate=10.0,
-        price_range=(1.0, 2.0),
         azimuth_offsets=0.05 * np.sin(9 * place),
-        **values,
+        law=CarlaDropoff(),
     )
 
 
@@ -63,17 +63,6 @@ PHYSICAL = {
     "coarse": replace(MODELS["coarse"], law=RangeEquation.of_ranges(8.0, 20.0)),
     "fine": replace(MODELS["fine"], law=RangeEquation.of_ranges(15.0, 42.0)),
 }
-ONE_WAY = {
-    "coarse": replace(MODELS["coarse"], field_of_view=math.radians(100)),
-    "fine": replace(MODELS["fine"], field_of_view=math.radians(357)),
-}
-Strength = tuple[dict[str, LidarModel], tuple[float, ...]]
-STRENGTHS = st.sampled_from(
-    [
-        *((MODELS, (0.0,)), (MODELS, (0.2,)), (MODELS, (0.6,))),
-        *((PHYSICAL, ()), (PHYSICAL, (0.0, 0.5)), (ONE_WAY, (0.0,)), (ONE_WAY, (0.2,))),
-    ]
-)
 
 
 def random_site(seed: int, poses: int = 3) -> Site:
@@ -119,48 +108,6 @@ def nearest_returns(site: Site) -> Float:
 
 
 @each_engine
-@given(st.integers(0, 2**32 - 1), st.sampled_from([0.3, 1.0, 3.0]), STRENGTHS)
-def test_same_as_the_full_scan_bit_for_bit(engine: Engine, seed: int, delta: float, strength: Strength) -> None:
-    site, (models, least) = random_site(seed), strength
-    settings = VisibilitySettings(delta, *least)
-    caster = make_ray_caster(site.triangles, engine)
-    lazy = finish(compute_visibility(site, models, settings, engine))
-    full, rays = full_scan(site, models, settings, caster)
-    assert (lazy.visible == full).all()
-    assert lazy.key == visibility_key(site, models, settings, engine)
-    assert lazy.parameters["rays_cast"] <= rays == lazy.parameters["rays_of_full_scan"]
-
-
-def soup(seed: int) -> Site:
-    """Triangles of all slopes and sizes, slivers too, with targets about them and several sensors at each place."""
-    random = np.random.default_rng(seed)
-    size = 10 ** random.uniform(-2, 1, (60, 1, 1))
-    triangles = random.uniform((-15, -15, -2), (15, 15, 4), (60, 1, 3)) + size * random.normal(0, 1, (60, 3, 3))
-    target = triangles[random.integers(0, 60, 50)].mean(axis=1) + random.normal(0, 0.2, (50, 3))
-    xyz = np.repeat(random.uniform((-15, -15, 0), (15, 15, 6), (3, 3)), 2, axis=0)
-    yaw = np.repeat(random.uniform(-math.pi, math.pi, 3), 2)
-    return Site(
-        name="soup",
-        origin=np.zeros(3),
-        region=box(-15, -15, 15, 15),
-        targets=Targets(target, np.ones(50), np.zeros(50, dtype=bool), 1.0),
-        candidates=make_candidates(xyz, list(MODELS) * 3, xyz[:, 2], yaw),
-        triangles=triangles,
-        reflectivity=varied_reflectivity(triangles),
-    )
-
-
-@each_engine
-@given(st.integers(0, 2**32 - 1), st.sampled_from([0.1, 1.0, 5.0]), STRENGTHS)
-def test_same_as_the_full_scan_in_a_soup(engine: Engine, seed: int, delta: float, strength: Strength) -> None:
-    site, (models, least) = soup(seed), strength
-    settings = VisibilitySettings(delta, *least)
-    lazy = finish(compute_visibility(site, models, settings, engine))
-    full, _ = full_scan(site, models, settings, make_ray_caster(site.triangles, engine))
-    assert (lazy.visible == full).all()
-
-
-@each_engine
 @pytest.mark.parametrize(
     ("key", "share"), [("type1", 0.04), pytest.param("type3", 0.03, marks=pytest.mark.slow), ("vls128", 0.03)]
 )
@@ -171,25 +118,9 @@ def test_same_as_the_full_scan_on_a_junction(engine: Engine, key: str, share: fl
     lazy = finish(compute_visibility(site, models, VisibilitySettings(), engine))
     full, rays = full_scan(site, models, VisibilitySettings(), caster)
     assert (lazy.visible == full).all()
+    assert lazy.key == visibility_key(site, models, VisibilitySettings(), engine)
     assert 0.02 < lazy.visible.mean() < 0.98
     assert lazy.parameters["rays_cast"] < share * rays
-
-
-@pytest.mark.slow
-@each_engine
-def test_same_as_plain_arithmetic_but_for_borderline_targets(engine: Engine) -> None:
-    borderline = seen = total = 0
-    for seed in range(40):
-        site, settings = random_site(seed), VisibilitySettings(0.6)
-        distance = nearest_returns(site)
-        decided = np.abs(distance - settings.delta) >= 1e-3
-        visible = grid_of(site, settings, engine).visible
-        assert (visible == (distance < settings.delta))[decided].all()
-        borderline += (~decided).sum()
-        seen += visible.sum()
-        total += decided.size
-    assert borderline < 0.005 * total
-    assert 0.1 * total < seen < 0.9 * total
 
 
 def decided_site(seed: int, delta: float) -> Site:
@@ -225,105 +156,9 @@ def test_moving_everything_changes_nothing(engine: Engine, seed: int, turn: floa
     assert (grid_of(turned, settings, engine).visible == expected).all()
 
 
-@each_engine
-@given(seed=st.integers(0, 2**32 - 1))
-@cases(30)
-def test_the_order_of_things_does_not_matter(engine: Engine, seed: int) -> None:
-    settings = VisibilitySettings(0.6)
-    site = decided_site(seed, settings.delta)
-    expected = grid_of(site, settings, engine).visible
-    random = np.random.default_rng(seed)
-    order, pose_order = random.permutation(len(site.targets)), random.permutation(len(site.candidates))
-    triangle_order = random.permutation(len(site.triangles))
-    poses = site.candidates
-    shuffled = replace(
-        site,
-        targets=replace(site.targets, xyz=site.targets.xyz[order]),
-        candidates=make_candidates(
-            poses.xyz[pose_order], poses.sensor[pose_order], poses.height[pose_order], poses.yaw[pose_order]
-        ),
-        triangles=site.triangles[triangle_order],
-        reflectivity=site.reflectivity[triangle_order],
-    )
-    assert (grid_of(shuffled, settings, engine).visible == expected[np.ix_(pose_order, order)]).all()
-
-
-def one_sensor_site(*walls: Float) -> Site:
-    """A sensor 5 m above the middle of a level road, targets along the x axis."""
-    x = np.arange(-14.0, 15.0)
-    triangles = np.concatenate([rectangle((-15, -15), (15, 15)), *walls])
-    return Site(
-        name="one",
-        origin=np.zeros(3),
-        region=box(-15, -15, 15, 15),
-        targets=Targets(np.column_stack([x, 0 * x, 0 * x]), np.ones(29), np.zeros(29, dtype=bool), 1.0),
-        candidates=make_candidates(np.array([[0.0, 0.0, 5.0]]), ["fine"], np.array([5.0])),
-        triangles=triangles,
-        reflectivity=np.full(len(triangles), 0.3),
-    )
-
-
-@needs_any
-def test_a_wall_hides_what_lies_behind_it() -> None:
-    open_site = one_sensor_site()
-    x = open_site.targets.xyz[:, 0]
-    wall = np.array([[[4.0, -9, 0], [4, 9, 0], [4, 9, 9]], [[4.0, -9, 0], [4, 9, 9], [4, -9, 9]]])
-    free = grid_of(open_site, VisibilitySettings(0.9)).visible[0]
-    behind_wall = grid_of(one_sensor_site(wall), VisibilitySettings(0.9)).visible[0]
-    assert free[x > 5].any()
-    assert not behind_wall[x > 5].any()
-    assert (behind_wall == free)[x < 3].all()
-
-
-@needs_any
-def test_range_limits_returns() -> None:
-    site = one_sensor_site()
-    model = small_model("fine", 16, 120, min_range=7.0, max_range=10.0)
-    steps = compute_visibility(site, {"fine": model}, VisibilitySettings(0.9), ANY)
-    nearest = nearest_return(site.candidates.xyz[0], 0.0, model, site.triangles, site.targets.xyz)
-    assert (np.abs(nearest - 0.9) > 1e-3).all()
-    visible = finish(steps).visible[0]
-    assert (visible == (nearest < 0.9)).all()
-    slant = np.hypot(site.targets.xyz[:, 0], 5.0)
-    unlimited = nearest_return(site.candidates.xyz[0], 0.0, MODELS["fine"], site.triangles, site.targets.xyz) < 0.9
-    assert (unlimited & ~visible & (slant > 6.1) & (slant < 7)).any()  # reached, but by returns that are too near
-    assert (unlimited & ~visible & (slant > 10.9)).any()
-
-
-@needs_any
-def test_weak_returns_do_not_count() -> None:
-    site = one_sensor_site()
-    site = replace(site, reflectivity=np.ones(len(site.triangles)))
-    x = np.abs(site.targets.xyz[:, 0])
-    models = {"fine": small_model("fine", 64, 360)}
-    everything, strong = (
-        finish(compute_visibility(site, models, VisibilitySettings(0.6, least), ANY)).visible[0] for least in (0.0, 0.5)
-    )
-    # cos θ · exp(−a r) at the target: 0.5 is reached about 8.5 m from the foot
-    strength = 5 / np.hypot(x, 5) * np.exp(-0.004 * np.hypot(x, 5))
-    assert everything[x > 9].any()
-    assert not strong[strength < 0.46].any()
-    assert (strong == everything)[strength > 0.54].all()
-
-
-@needs_any
-def test_the_road_is_seen_as_far_as_its_returns_are_detected() -> None:
-    site = one_sensor_site()
-    law = RangeEquation.of_ranges(9.0, 25.0)
-    reach = law.reach_on_level(0.3, 0.9, 5.0)
-    away = np.hypot(np.abs(site.targets.xyz[:, 0]), 5.0)
-    models = {"fine": small_model("fine", 64, 360, law=law)}
-    seen = finish(compute_visibility(site, models, VisibilitySettings(0.6), ANY)).visible[0]
-    everything = finish(compute_visibility(site, {"fine": small_model("fine", 64, 360)}, VisibilitySettings(0.6), ANY))
-    assert 7.0 < reach < 11.0
-    assert not seen[away > reach + 0.6].any()
-    assert (seen == everything.visible[0])[away < reach - 0.6].all()
-    assert everything.visible[0][away > reach + 0.6].any()
-
-
 @pytest.mark.parametrize(
     "values",
-    [(0,), (-1,), (math.nan,), (math.inf,), (1, -0.1), (1, 1.1), (1, math.nan), (1, 0, 0), (1, 0, 1), (1, 0, math.nan)],
+    [(0,), (math.nan,), (math.inf,), (1, -0.1), (1, 1.1), (1, 0, 0), (1, 0, 1)],
 )
 def test_settings_that_mean_nothing(values: tuple[float, ...]) -> None:
     with pytest.raises(SeipError):
@@ -360,6 +195,9 @@ def test_an_interrupted_run_goes_on_from_its_finished_rows(tmp_path: Path, monke
     assert sorted(casting.poses) == list(range(len(site.candidates)))
     assert (tmp_path / "grid.npz").read_bytes() == (tmp_path / "whole.npz").read_bytes()
     assert sorted(path.name for path in tmp_path.iterdir()) == ["grid.npz", "whole.npz"]
+    back = VisibilityGrid.load(tmp_path / "grid.npz")
+    assert (back.packed == whole.packed).all()
+    assert (back.shape, back.key, back.parameters) == (whole.shape, whole.key, whole.parameters)
 
 
 @needs_any
@@ -381,37 +219,19 @@ def test_rows_of_other_inputs_or_damaged_ones_are_computed_again(
 
 
 @needs_any
-def test_a_grid_comes_back_from_its_file_and_the_file_is_the_same_each_time(tmp_path: Path) -> None:
-    grid = grid_of(random_site(2), VisibilitySettings())
-    for name in ("a.npz", "b.npz"):
-        grid.save(tmp_path / name)
-    assert (tmp_path / "a.npz").read_bytes() == (tmp_path / "b.npz").read_bytes()
-    back = VisibilityGrid.load(tmp_path / "a.npz")
-    assert (back.packed == grid.packed).all()
-    assert (back.shape, back.key, back.parameters) == (grid.shape, grid.key, grid.parameters)
-
-
-@needs_any
 def test_files_that_are_no_grid(tmp_path: Path) -> None:
     grid_of(random_site(2), VisibilitySettings()).save(tmp_path / "good.npz")
     whole = (tmp_path / "good.npz").read_bytes()
     bad = tmp_path / "bad.npz"
     with pytest.raises(SeipError, match="no visibility grid"):
         VisibilityGrid.load(tmp_path / "absent.npz")
-    for content in (b"", b"hello", whole[: len(whole) // 2], whole[:200] + b"\0" * 40 + whole[240:]):
-        bad.write_bytes(content)
-        with pytest.raises(SeipError, match="delete it"):
-            VisibilityGrid.load(bad)
-    np.savez(bad, other=np.zeros(3))
+    bad.write_bytes(whole[: len(whole) // 2])
     with pytest.raises(SeipError, match="delete it"):
         VisibilityGrid.load(bad)
     header = '{"schema": "seip.visibility", "version": 99, "key": "", "shape": [1, 8], "parameters": {}}'
     np.savez(bad, packed=np.zeros((1, 1), dtype=np.uint8), header=np.array(header))
     with pytest.raises(SeipError, match="of this version"):
         VisibilityGrid.load(bad)
-    np.save(tmp_path / "bad.npy", np.zeros(3))
-    with pytest.raises(SeipError, match="delete it"):
-        VisibilityGrid.load(tmp_path / "bad.npy")
 
 
 def test_the_key_follows_from_what_the_grid_follows_from() -> None:
@@ -422,6 +242,9 @@ def test_the_key_follows_from_what_the_grid_follows_from() -> None:
     assert visibility_key(same, renamed, VisibilitySettings(1.0), "bvh") == key
     poses = site.candidates
     nudged = site.triangles + np.array([0, 0, 1e-9])
+    seeing = lambda view: {name: replace(model, field_of_view=view) for name, model in MODELS.items()}  # noqa: E731
+    clockwise = {name: replace(model, clockwise=True) for name, model in MODELS.items()}
+    assert visibility_key(site, clockwise, settings, "bvh") == key
     longer = {name: replace(model, max_range=41.0) for name, model in MODELS.items()}
     others = [
         visibility_key(replace(site, triangles=nudged), MODELS, settings, "bvh"),
@@ -429,6 +252,9 @@ def test_the_key_follows_from_what_the_grid_follows_from() -> None:
             replace(site, targets=replace(site.targets, xyz=site.targets.xyz + 1e-9)), MODELS, settings, "bvh"
         ),
         visibility_key(replace(site, candidates=replace(poses, yaw=poses.yaw + 1e-9)), MODELS, settings, "bvh"),
+        visibility_key(replace(site, candidates=replace(poses, tilt=poses.tilt + 0.1)), MODELS, settings, "bvh"),
+        visibility_key(site, seeing(1.0), settings, "bvh"),
+        visibility_key(site, seeing(2.0), settings, "bvh"),
         visibility_key(site, longer, settings, "bvh"),
         visibility_key(site, MODELS, VisibilitySettings(1.1), "bvh"),
         visibility_key(site, MODELS, VisibilitySettings(1.0, 0.1), "bvh"),
@@ -455,3 +281,39 @@ def test_warnings_say_when_targets_are_too_far_apart_for_delta() -> None:
     site = junction_site(positions=8, sensors=["type3"], heights=[8.0], spacing=2.0)
     warnings = resolution_warnings(site, load_catalogue(), VisibilitySettings(1.0))
     assert any("targets are 2 m apart and δ is 1 m" in warning for warning in warnings)
+
+
+QUICK = 12
+MANY, MOST = 25, 375
+
+
+def no_fault(total: Counter[str]) -> None:
+    assert not any(total[fault] for fault in FAULTS), sentence(total)
+    assert total["seen"] > 0.02 * total["entries"]
+    assert total["undecided"] < 0.01 * total["entries"]
+
+
+@each_engine
+def test_grids_of_random_scenes(engine: Engine) -> None:
+    no_fault(search([engine], 16, first_seed=40))  # faults that there were showed in scenes 42, 43, 51 and 52
+
+
+@pytest.mark.parametrize(
+    ("first", "number"),
+    [
+        pytest.param(100_000, MANY, marks=pytest.mark.slow, id="many"),
+        pytest.param(100_000 + MANY, MOST, marks=pytest.mark.long, id="most"),
+    ],
+)
+@each_engine
+def test_grids_of_many_random_scenes(engine: Engine, first: int, number: int) -> None:
+    no_fault(search([engine], number, first_seed=first))
+
+
+@pytest.mark.slow
+def test_the_arithmetic_decides_nearly_all_by_itself() -> None:
+    """The reference is no echo of what it evaluates: it says seen and unseen of what shares no code with it."""
+    verdicts = [assess(draw_case(seed)) for seed in range(QUICK)]
+    undecided = sum(int(verdict.undecided.sum()) for verdict in verdicts)
+    assert undecided < 0.01 * sum(verdict.seen.size for verdict in verdicts)
+    assert all(not (verdict.seen & verdict.undecided).any() for verdict in verdicts)

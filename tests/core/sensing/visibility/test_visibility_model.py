@@ -6,14 +6,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from seip_addon.core.base.progress import finish
 from seip_addon.core.sensing.lidar.catalogue import load_catalogue
 from seip_addon.core.sensing.scans.sensor import level_orientation
-from seip_addon.core.sensing.visibility.grid import seen_from
+from seip_addon.core.sensing.visibility.grid import compute_visibility, seen_from
 from seip_addon.core.sensing.visibility.ray_casting import make_ray_caster
 from seip_addon.core.sensing.visibility.settings import VisibilitySettings
+from seip_addon.core.sensing.visibility.sight_lines import sight_lines
 from seip_addon.core.sensing.visibility.target_index import TargetIndex
 from seip_addon.core.sensing.visibility.visibility_model import visibility_model
-from tests.builders.synthetic_junction import junction_site
+from tests.builders.synthetic_junction import junction_site, rectangle
 from tests.engines import ANY, each_engine
 from tests.few import few
 from tests.oracles.full_scan import beam_directions
@@ -53,12 +55,52 @@ def test_a_turned_sensor_sees_what_its_full_scan_sees(engine, angles):
     assert seen.any()
 
 
-def test_a_level_sensor_sees_what_its_candidate_sees():
+def test_a_sensor_mounted_as_its_candidate_sees_the_candidates_row():
     poses = SITE.candidates
-    some = np.arange(0, len(poses), max(1, len(poses) // 6))
-    looks = visibility_model(SITE, SIGHT, ANY)
-    for pose in some:
-        row = seen_from(looks, poses, MODELS, pose)[0]
-        model = MODELS[str(poses.sensor[pose])]
-        seen = looks.see(model, poses.xyz[pose], level_orientation(float(poses.yaw[pose])))
-        assert (seen == row).all()
+    tilted = replace(poses, tilt=np.where(np.arange(len(poses)) % 2, 0.3, 0.0))
+    looks = visibility_model(replace(SITE, candidates=tilted), SIGHT, ANY)
+    for pose in range(0, len(poses), max(1, len(poses) // 6)):
+        for mounted in (poses, tilted):
+            row = seen_from(looks, mounted, MODELS, pose)[0]
+            model = MODELS[str(mounted.sensor[pose])]
+            assert (looks.see(model, mounted.xyz[pose], mounted.orientation(pose)) == row).all()
+
+
+DELTA = 0.5
+AWAY, HALF, TALL = 6.0, 4.0, 9.0
+"""Metres from the sensor to the wall, half the wall's width, and its height, which is above the sensor."""
+
+
+def walled_site():
+    """Return a level site with one wall east of the only position."""
+    site = junction_site(positions=1, heights=[5.0], sensors=("vlp16",), spacing=2.0)
+    x, y, _ = site.candidates.xyz[0]
+    foot = [(x + AWAY, y - HALF, 0.0), (x + AWAY, y + HALF, 0.0)]
+    top = [(*end[:2], TALL) for end in foot]
+    wall = np.array([(foot[0], foot[1], top[1]), (foot[0], top[1], top[0])])
+    low, high = (tuple(edge(site.targets.xyz[:, :2], axis=0) + by) for edge, by in ((np.min, -80.0), (np.max, 80.0)))
+    triangles = np.concatenate([rectangle(low, high, step=40.0), wall])
+    level = replace(site.targets, xyz=site.targets.xyz * (1.0, 1.0, 0.0))
+    return replace(site, targets=level, triangles=triangles, reflectivity=np.full(len(triangles), 0.9))
+
+
+def test_only_road_behind_the_wall_counts_as_hidden():
+    site = walled_site()
+    settings = VisibilitySettings(delta=DELTA)
+    grid = finish(compute_visibility(site, MODELS, settings, ANY))
+    row = grid.sees(0)
+    sight = sight_lines(site, 0, MODELS["vlp16"], row, DELTA, ANY)
+
+    assert sight.seen == row.sum()
+    assert sight.in_range == sight.seen + len(sight.hidden) + len(sight.missed)
+    hidden, missed = (
+        squares.mean(axis=1)[:, :2] - site.candidates.xyz[0, :2] for squares in (sight.hidden, sight.missed)
+    )
+    assert len(hidden) > 20
+    assert len(missed) > 20
+    for places, behind in ((hidden, True), (missed, False)):
+        crossing = places[:, 1] * AWAY / np.where(places[:, 0] > 0.0, places[:, 0], np.inf)  # of the wall's plane
+        by_edge = np.abs(np.abs(crossing) - HALF) < 1e-6
+        just_behind = (places[:, 0] > AWAY) & (places[:, 0] < AWAY + 2 * DELTA)
+        in_shadow = (places[:, 0] > AWAY) & (np.abs(crossing) < HALF)
+        assert (in_shadow == behind)[~by_edge & ~just_behind].all()
