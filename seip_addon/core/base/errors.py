@@ -1,6 +1,6 @@
 """`SeipError`, the exception for mistakes that a user can correct.
 
-`tests/core/base/test_errors.py` shows its use.
+`tests/core/base/test_basics.py` shows its use.
 """
 
 import re

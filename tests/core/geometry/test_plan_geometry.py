@@ -1,9 +1,14 @@
+"""Geometry in plan, rotations, and the view of a map in a window."""
+
 import numpy as np
 import pytest
 import shapely
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
 
+from seip_addon.core.geometry.map_view import MAX_SCALE, MapView
+from seip_addon.core.geometry.orientation import quaternion_of, quaternion_rotation
 from seip_addon.core.geometry.plan import closed, opened, outline, plane_height, signed_area, surface_height
 from tests.oracles.random_cases import cases
 
@@ -59,3 +64,42 @@ def test_the_surface_is_the_highest_plane_over_a_point(some, x, y):
         assert found >= plane_height(over, np.repeat(place, len(over), axis=0)).max() - 1e-9
     elif shapely.distance(polygons, shapely.Point(x, y)).min(initial=np.inf) > 1e-2:
         assert np.isnan(found)
+
+
+ANGLE = st.floats(-np.pi, np.pi) | st.sampled_from([0.0, np.pi / 2, -np.pi / 2, np.pi])
+
+
+@given(ANGLE, ANGLE, ANGLE)
+def test_quaternions_against_scipy(yaw, tilt, roll):
+    turn = Rotation.from_euler("ZYX", [yaw, tilt, roll])
+    x, y, z, w = turn.as_quat()
+    np.testing.assert_allclose(quaternion_rotation(np.array([w, x, y, z])), turn.as_matrix(), rtol=0.0, atol=1e-12)
+    quaternion = quaternion_of(turn.as_matrix())
+    assert np.linalg.norm(quaternion) == pytest.approx(1.0, abs=1e-12)
+    assert abs(quaternion @ [w, x, y, z]) == pytest.approx(1.0, abs=1e-9)
+
+
+FRAME = (100.0, 50.0, 900.0, 650.0)
+
+
+@pytest.fixture
+def points():
+    return np.random.default_rng(3).uniform((-700.0, 200.0), (500.0, 900.0), (40, 2))
+
+
+def test_all_points_are_in_the_frame_of_the_fitted_view_and_nearly_fill_it(points):
+    pixels = MapView.fitted(points, FRAME).to_pixels(points)
+    left, bottom, right, top = FRAME
+    assert np.all((pixels >= (left, bottom)) & (pixels <= (right, top)))
+    shares = np.ptp(pixels, axis=0) / (right - left, top - bottom)
+    assert shares.max() == pytest.approx(0.92)
+    assert (pixels.min(axis=0) + pixels.max(axis=0)) / 2 == pytest.approx(((left + right) / 2, (bottom + top) / 2))
+
+
+@pytest.mark.parametrize("factor", [1.25, 1e9, 1e-9])
+def test_the_place_under_the_mouse_stays_there_as_the_view_is_zoomed(points, factor):
+    view, mouse = MapView.fitted(points, FRAME), (321.0, 456.0)
+    zoomed = view.zoomed(factor, mouse)
+    assert zoomed.to_metres(mouse) == pytest.approx(view.to_metres(mouse))
+    expected = {1e9: MAX_SCALE, 1e-9: view.scale / 2}.get(factor, view.scale * factor)
+    assert zoomed.scale == pytest.approx(expected)

@@ -5,11 +5,17 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from seip_addon.core.geometry.winding_number import enclosed
+from seip_addon.core.geometry.winding_number import _shares, enclosed
 from seip_addon.core.site.obstruction import post_blocked
 from seip_addon.core.site.scene_geometry import Mesh
 from tests.oracles.random_cases import cases
-from tests.oracles.winding_number import winding_number
+
+
+def winding_number(points, triangles):
+    """Return the winding number (n,) of points (n, 3) in a triangle soup (m, 3, 3)."""
+    numbers = [_shares(triangles - point).sum() for point in points]
+    return np.array(numbers, dtype=np.float64)
+
 
 TETRAHEDRON = np.array([(1, 1, 1), (1, -1, -1), (-1, 1, -1), (-1, -1, 1)], dtype=float)
 FACES = np.array([(0, 1, 2), (0, 3, 1), (0, 2, 3), (1, 3, 2)])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import os
 import signal
 import subprocess
@@ -11,7 +12,11 @@ from pathlib import Path
 import pytest
 
 from seip_addon.core.base.errors import SeipError
+from seip_addon.core.sensing.lidar.catalogue import load_catalogue
+from seip_addon.core.site.installed_cost import load_installed_cost
+from seip_addon.core.storage.csv_table import save_csv
 from seip_addon.core.storage.files import lock_folder, locked_folder, save_json, whole_file
+from seip_addon.core.world.streetscape.site_file import read_site_description
 
 ROOT = Path(__file__).resolve().parents[3]
 HOLD = "import sys, time; from pathlib import Path; from seip_addon.core.storage.files import *; "
@@ -74,3 +79,47 @@ def test_a_folder_that_is_made_for_a_file_goes_with_it(tmp_path):
     assert [one.name for one in tmp_path.rglob("*")] == ["a"]
     save_json(path, 1)
     assert path.exists()
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        '=HYPERLINK("http://example.com","post")',
+        "+1+cmd|' /C calc'!A0",
+        "  =1",
+        "\N{FULLWIDTH EQUALS SIGN}1",
+    ],
+)
+def test_a_formula_is_written_as_text(tmp_path, name):
+    save_csv(tmp_path / "a.csv", ["name"], [[name]])
+    with (tmp_path / "a.csv").open(newline="", encoding="utf-8") as file:
+        assert list(csv.reader(file)) == [["name"], [f"'{name}"]]
+
+
+def test_a_carriage_return_begins_no_row(tmp_path):
+    save_csv(tmp_path / "a.csv", ["name", "x"], [["post\r=1+1", 2]])
+    with (tmp_path / "a.csv").open(newline="", encoding="utf-8") as file:
+        assert list(csv.reader(file)) == [["name", "x"], ["post =1+1", "2"]]
+
+
+@pytest.mark.parametrize("value", ["-3.500", "-10 -5 0", "signal pole 1", -3.5])
+def test_numbers_and_ordinary_names_stay_as_they_are(tmp_path, value):
+    save_csv(tmp_path / "a.csv", ["value", "x"], [[value, 1]])
+    assert (tmp_path / "a.csv").read_text(encoding="utf-8") == f"value,x\n{value},1\n"
+
+
+READERS = {
+    "LiDAR catalogue": lambda path: load_catalogue((path,)),
+    "installed costs": load_installed_cost,
+    "site description": read_site_description,
+}
+
+
+@pytest.mark.parametrize("what", READERS)
+def test_text_of_another_encoding_and_folders_are_refused(tmp_path, what):
+    file = tmp_path / "own.toml"
+    file.write_bytes("backhaul_usd = 1".encode("utf-16"))
+    with pytest.raises(SeipError, match=rf"cannot read the {what} .*own\.toml: it is not UTF-8 text; name a TOML file"):
+        READERS[what](file)
+    with pytest.raises(SeipError, match=rf"cannot read the {what} .*: Is a directory"):
+        READERS[what](tmp_path)
