@@ -8,7 +8,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.polynomial import Polynomial
 from scipy.integrate import quad, solve_ivp
-from scipy.special import fresnel
 
 from seip_addon.core.world.opendrive.profile import profile
 from seip_addon.core.world.opendrive.reference_line import Clothoid, ReferenceLine, param_poly3, poly3
@@ -27,17 +26,6 @@ def test_an_arc_is_a_piece_of_its_circle(curvature):
     x, y, heading = at(Clothoid(curvature, 0.0), 40.0)
     np.testing.assert_allclose([x, heading], [math.sin(40 * curvature) / curvature, 40 * curvature], atol=1e-12)
     assert math.hypot(x, y - 1 / curvature) == pytest.approx(1 / abs(curvature), abs=1e-9)
-
-
-def test_a_clothoid_from_a_straight_is_a_fresnel_integral():
-    rate = 0.004
-    scale = math.sqrt(math.pi / rate)
-    distance = np.linspace(0.0, 200.0, 50)
-    sine, cosine = fresnel(distance / scale)
-    x, y, heading = Clothoid(0.0, rate)(distance)
-    np.testing.assert_allclose(x, scale * cosine, atol=1e-9)
-    np.testing.assert_allclose(y, scale * sine, atol=1e-9)
-    np.testing.assert_allclose(heading, rate * distance**2 / 2, atol=1e-12)
 
 
 @given(curvatures, curvatures, lengths)

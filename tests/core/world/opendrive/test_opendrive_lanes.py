@@ -68,7 +68,10 @@ rises = st.tuples(st.floats(-0.1, 0.1), st.floats(-2e-3, 2e-3), st.floats(-3e-5,
 VANISHING = '<width sOffset="0" a="2.0" b="0.03125" c="0.0" d="-1.4824546509342596e-05"/>'
 
 
-def chords_stay_within_the_tolerance(folder, shape, width, elevation, tolerance):
+@given(curves, widths, rises, st.sampled_from([0.005, 0.02, 0.1]))
+@example('<arc curvature="0"/>', VANISHING, "", 0.005)
+@settings(max_examples=12)
+def test_chords_stay_within_the_tolerance(folder, shape, width, elevation, tolerance):
     bent = road(geometry(shape, 80.0), section(lane(-1, None, inside=width)), elevation=elevation)
     (coarse,) = surfaces(folder, bent, tolerance=tolerance)
     (fine,) = surfaces(folder, bent, tolerance=tolerance / 100)
@@ -77,16 +80,6 @@ def chords_stay_within_the_tolerance(folder, shape, width, elevation, tolerance)
         assert shapely.distance(shapely.linestrings(near[:, :2]), shapely.points(true[:, :2])).max() < 1.02 * tolerance
         for number in range(0, len(true), 7):
             assert distance_to_line(near, true[number]) < 1.02 * tolerance
-
-
-bends = given(curves, widths, rises, st.sampled_from([0.005, 0.02, 0.1]))
-
-
-@bends
-@example('<arc curvature="0"/>', VANISHING, "", 0.005)
-@settings(max_examples=12)
-def test_chords_stay_within_the_tolerance(folder, shape, width, elevation, tolerance):
-    chords_stay_within_the_tolerance(folder, shape, width, elevation, tolerance)
 
 
 def distance_to_line(line, point):

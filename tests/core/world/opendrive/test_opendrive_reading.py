@@ -36,11 +36,8 @@ def test_sections_and_geometries_may_come_in_any_order(tmp_path):
 
 BROKEN = {
     "curvature": (road(geometry('<arc curvature="nan"/>')), "road 1: curvature='nan' of <arc> is not a plausible"),
-    "infinite": (road(geometry(x=float("inf"))), "road 1: x='inf' of <geometry> is not a plausible"),
     "huge": (road(geometry(x=1e300)), "road 1: x='1e\\+300' of <geometry> is not a plausible"),
-    "word": (road(lateral='<superelevation s="0" a="flat"/>'), "road 1: a='flat' of <superelevation>"),
     "zero": (road(geometry(length=0.0)), "road 1: length=0 of <geometry> must be above zero"),
-    "negative": (road(geometry(length=-5.0)), "road 1: length=-5 of <geometry> must be above zero"),
     "missing": ('<road id="9"><planView><geometry s="0" x="0" y="0"/></planView></road>', "has no 'length'"),
     "nameless": ("<road/>", "<road> has no 'id'"),
     "planless": ('<road id="9"/>', "road 9 has no <geometry>"),
@@ -51,7 +48,6 @@ BROKEN = {
         road(geometry('<paramPoly3 aU="0" bU="0" cU="0" dU="0" aV="0" bV="0" cV="0" dV="0"/>')),
         "road 1: a <paramPoly3> has no extent",
     ),
-    "width": (road(sections=section(lane(-1, "NaN"))), "road 1, lane -1: a='NaN' of <width>"),
     "half lane": (road(sections=section(lane(-1.5))), "road 1: id=-1.5 of <lane> must be a whole number"),
     "object": (road(objects='<object id="4" s="x" t="0"/>'), "road 1, object 4: s='x' of <object>"),
     "repeat": (
@@ -174,32 +170,15 @@ VALUES = [match.span(1) for match in re.finditer(r'(?<![a-z])[a-zA-Z]+="([^"]*)"
 WRONG = ["0", "-1", "0.5", "3", "1e5", "1e9", "-1e9", "1e-300", "1e300", "nan", "-inf", "x", ""]
 
 
-def is_read_or_refused_in_words(folder, span, value):
+@given(st.sampled_from(VALUES), st.sampled_from(WRONG))
+@cases(300, 30)
+def test_a_value_gone_wrong_is_read_or_refused_in_words(tmp_path_factory, span, value):
     text = EVERYTHING[: span[0]] + value + EVERYTHING[span[1] :]
     try:
-        road_map = read_text(folder, text, "mutant.xodr")
+        road_map = read_text(tmp_path_factory.getbasetemp(), text, "mutant.xodr")
         surfaces = map_lanes(road_map)
         objects = (*road_map.objects, *road_map.signals)
     except SeipError:
         return
     assert all(np.isfinite(surface.triangles).all() for surface in surfaces)
     assert all(np.isfinite(obj.position).all() for obj in objects)
-
-
-@given(st.sampled_from(VALUES), st.sampled_from(WRONG))
-@cases(30)
-def test_a_value_gone_wrong_is_read_or_refused_in_words(tmp_path_factory, span, value):
-    is_read_or_refused_in_words(tmp_path_factory.getbasetemp(), span, value)
-
-
-@pytest.mark.parametrize(
-    "spans",
-    [
-        pytest.param(VALUES[::5], marks=pytest.mark.slow, id="every-fifth"),
-        pytest.param(VALUES, marks=pytest.mark.long, id="all"),
-    ],
-)
-@pytest.mark.parametrize("value", WRONG)
-def test_every_value_gone_wrong_is_read_or_refused_in_words(tmp_path, value, spans):
-    for span in spans:
-        is_read_or_refused_in_words(tmp_path, span, value)

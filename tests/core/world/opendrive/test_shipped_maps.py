@@ -12,9 +12,11 @@ import pytest
 import shapely
 from defusedxml.ElementTree import parse
 
+from seip_addon.core.base.progress import finish
 from seip_addon.core.programs.sumo_programs import find_sumo
+from seip_addon.core.workflows.site_places import site_places
 from seip_addon.core.world.opendrive.junctions import junction_area
-from seip_addon.core.world.opendrive.lanes import LaneSurface
+from seip_addon.core.world.opendrive.lanes import LaneSurface, lane_surfaces
 from seip_addon.core.world.opendrive.objects import PlacedObject
 from seip_addon.core.world.opendrive.read import read_map
 from seip_addon.core.world.opendrive.road_map import RoadMap
@@ -27,7 +29,7 @@ if TYPE_CHECKING:
 
     from shapely.geometry.base import BaseGeometry
 
-SCENES = Path(__file__).parents[4] / "scenes"
+SCENES = Path(__file__).resolve().parents[4] / "scenes"
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,23 +61,10 @@ def shipped(request: pytest.FixtureRequest) -> Shipped:
     return load(request.param)
 
 
-@pytest.fixture(scope="module")
-def junction() -> Shipped:
-    return load("junction.xodr")
-
-
-@pytest.fixture(scope="module")
-def corridor() -> Shipped:
-    return load("corridor.xodr")
-
-
 def load(name: str) -> Shipped:
     path = SCENES / name
     road_map = read_map(path)
     return Shipped(path, parse(path).getroot(), road_map, map_lanes(road_map), road_map.objects)
-
-
-# --- Both maps ---------------------------------------------------------------------------------------------------
 
 
 def test_linked_lanes_meet_within_a_centimetre(shipped: Shipped) -> None:
@@ -118,25 +107,6 @@ def lane_joints(root: Element) -> Iterator[tuple[tuple[str, int, int, str], tupl
                     contact = neighbour.attrib["contactPoint"]
                     section_there = 0 if contact == "start" else last_section[neighbour.attrib["elementId"]]
                     yield own, (neighbour.attrib["elementId"], section_there, other, contact)
-
-
-def test_junction_connections_agree_with_the_lanes_links(shipped: Shipped) -> None:
-    roads = {road.attrib["id"]: road for road in shipped.root.iter("road")}
-    for junction in shipped.root.iter("junction"):
-        connecting = [road for road in roads.values() if road.get("junction") == junction.get("id")]
-        connections = junction.findall("connection")
-        assert {road.attrib["id"] for road in connecting} == {item.attrib["connectingRoad"] for item in connections}
-        for connection in connections:
-            road = roads[connection.attrib["connectingRoad"]]
-            predecessor = road.find("link/predecessor")
-            assert predecessor is not None
-            assert predecessor.get("elementId") == connection.get("incomingRoad")
-            by_lanes = {
-                (link.attrib["id"], lane.attrib["id"])
-                for lane in road.iter("lane")
-                for link in lane.findall("link/predecessor")
-            }
-            assert by_lanes == {(link.attrib["from"], link.attrib["to"]) for link in connection.iter("laneLink")}
 
 
 def test_carriageway_is_one_piece_without_holes(shipped: Shipped) -> None:
@@ -190,15 +160,25 @@ def test_sumo_imports_the_map(shipped: Shipped, tmp_path: Path) -> None:
     assert signalled == driving
 
 
-# --- The four-arm junction ---------------------------------------------------------------------------------------
-
-
-# --- The corridor ------------------------------------------------------------------------------------------------
-
-
 def test_every_traffic_light_has_its_post(shipped: Shipped) -> None:
     posts = np.array([placed.position[:2] for placed in shipped.objects if placed.kind == "pole"])
     lights = np.array([signal.position[:2] for signal in shipped.road_map.signals])
     assert len(posts) == len(lights)
     for light in lights:
         assert np.hypot(*(posts - light).T).min() < 1e-6
+
+
+@pytest.mark.parametrize("name", ["junction", "corridor"])
+def test_dots_lie_on_the_junctions_and_lines_on_the_carriageway(name):
+    places = finish(site_places(SCENES / f"{name}.xodr"))
+    road_map = read_map(SCENES / f"{name}.xodr")
+    lanes = [lane for road in road_map.roads for lane in lane_surfaces(road)]
+    areas = [junction_area(lanes, place.key) for place in places.places]
+    shift = road_map.roads[0].frame(np.zeros(1)).origin[0, :2] - places.plan.streets[0].line[0]
+    for area, (x, y) in zip(areas, places.plan.junctions + shift, strict=True):
+        assert area.contains(shapely.Point(x, y))
+    road = shapely.union_all([lane.polygon for lane in lanes]).buffer(1.0)
+    assert len(places.plan.streets) == len(road_map.roads)
+    assert all(road.covers(shapely.LineString(street.line + shift)) for street in places.plan.streets)
+    assert set(places.plan.names.names) == {road.name for road in road_map.roads if road.name and not road.junction_id}
+    assert not any(f"junction{place.key}" in place.name.casefold() for place in places.places)

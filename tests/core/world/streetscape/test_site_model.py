@@ -12,22 +12,14 @@ from seip_addon.core.geometry.plan import signed_area
 from seip_addon.core.site.roles import Role
 from seip_addon.core.world.opendrive.read import read_map
 from seip_addon.core.world.streetscape.description import Area, Building, Poles, SiteDescription, Trees
-from tests.builders.map_models import site_model
+from tests.builders.map_models import HERE, model_of_street, site_model
 from tests.builders.opendrive_text import document, geometry, read_text, road
-from tests.builders.street_map import street_map
 
 MAPS = Path(os.environ.get("SEIP_MAPS") or Path(__file__).resolve().parents[5] / "shared" / "opendrive")
-HERE = SiteDescription(near=(0.0, 0.0), radius=30.0)
 SIGNAL = (
     '<signal id="1" s="{s}" t="{t}" zOffset="0" orientation="{to}" dynamic="{dynamic}" type="1000001" hOffset="0"/>'
 )
 BOX = '<object id="{id}" type="{kind}" name="{name}" s="80" t="{t}" zOffset="0" hdg="0" {size}/>'
-
-
-def model(tmp_path, description=HERE, **options):
-    path = tmp_path / "street.xodr"
-    path.write_text(street_map(**options), encoding="utf-8")
-    return finish(site_model(read_map(path), description))
 
 
 def part(built, name):
@@ -55,19 +47,19 @@ def placed(each):
 
 def test_the_region_is_the_driving_surface_within_the_radius(tmp_path):
     expected = shapely.box(-30, -3.5, 30, 3.5).intersection(shapely.Point(0, 0).buffer(30, quad_segs=32))
-    built = model(tmp_path)
+    built = model_of_street(tmp_path)
     assert built.region.symmetric_difference(expected).area < 0.05
     assert plan(part(built, "Region of interest")).symmetric_difference(expected).area < 0.05
 
 
 def test_flush_pavements_are_raised_and_raised_ones_are_kept(tmp_path):
     for kerb, height in ((0.0, 0.12), (0.2, 0.2)):
-        heights = part(model(tmp_path, kerb=kerb), "Pavements").solid.vertices[:, 2]
+        heights = part(model_of_street(tmp_path, kerb=kerb), "Pavements").solid.vertices[:, 2]
         np.testing.assert_allclose(heights, height, atol=1e-9)
 
 
 def test_pavements_near_the_region_are_candidate_areas_and_others_are_not(tmp_path):
-    built = model(tmp_path)
+    built = model_of_street(tmp_path)
     near, verge = with_role(built, Role.CANDIDATE_AREAS)
     assert Role.GROUND in near.roles
     assert verge.name == "Verge strip"
@@ -80,7 +72,7 @@ def test_pavements_near_the_region_are_candidate_areas_and_others_are_not(tmp_pa
 
 def test_every_kind_of_lane_has_its_surface(tmp_path):
     kinds = ("driving", "biking", "parking", "shoulder", "median", "border", "sidewalk")
-    built = model(tmp_path, lane_types=kinds)
+    built = model_of_street(tmp_path, lane_types=kinds)
     roads = {each.name for each in with_role(built, Role.ROADS)}
     ground = {each.name for each in with_role(built, Role.GROUND)}
     assert roads == {"Driving lanes", "Cycle lanes", "Parking lanes", "Shoulders"}
@@ -89,7 +81,7 @@ def test_every_kind_of_lane_has_its_surface(tmp_path):
 
 
 def test_ground_and_lanes_leave_no_hole(tmp_path):
-    built = model(tmp_path)
+    built = model_of_street(tmp_path)
     names = ("Driving lanes", "Pavements", "Pavements beyond", "Verge")
     covered = shapely.union_all([plan(part(built, name)) for name in names])
     assert covered.buffer(0.01).buffer(-0.01).contains(shapely.Point(0, 0).buffer(40))
@@ -98,7 +90,7 @@ def test_ground_and_lanes_leave_no_hole(tmp_path):
 
 def test_a_grade_is_followed_by_everything(tmp_path):
     tree = Trees(np.array([[-20.0, 9.0]]), 8.0, 5.0)
-    built = model(tmp_path, replace(HERE, trees=(tree,)), grade=0.05)
+    built = model_of_street(tmp_path, replace(HERE, trees=(tree,)), grade=0.05)
     assert built.origin[2] == round(0.05 * 110)
     heights = part(built, "Driving lanes").solid.vertices
     np.testing.assert_allclose(heights[:, 2] + built.origin[2], 0.05 * (heights[:, 0] + 110), atol=1e-6)
@@ -108,10 +100,10 @@ def test_a_grade_is_followed_by_everything(tmp_path):
 def test_far_map_coordinates_change_nothing_but_the_origin(tmp_path):
     tree = Trees(np.array([[-20.0, 9.0]]), 8.0, 5.0)
     signal = SIGNAL.format(s=95, t=-5, to="+", dynamic="yes")
-    here = model(tmp_path, replace(HERE, trees=(tree,)), signals=signal)
+    here = model_of_street(tmp_path, replace(HERE, trees=(tree,)), signals=signal)
     x, y = 5_412_345.0, -4_987_654.0
     moved = replace(HERE, near=(x, y), trees=(replace(tree, positions=tree.positions + np.array([x, y])),))
-    there = model(tmp_path, moved, x=x, y=y, signals=signal)
+    there = model_of_street(tmp_path, moved, x=x, y=y, signals=signal)
     np.testing.assert_array_equal(there.origin - here.origin, [x, y, 0])
     assert [each.name for each in here.parts] == [each.name for each in there.parts]
     for mine, other in zip(here.parts, there.parts, strict=True):
@@ -122,7 +114,7 @@ def test_far_map_coordinates_change_nothing_but_the_origin(tmp_path):
 
 
 def test_the_same_inputs_give_the_same_model(tmp_path):
-    first, second = model(tmp_path), model(tmp_path)
+    first, second = model_of_street(tmp_path), model_of_street(tmp_path)
     for mine, other in zip(first.parts, second.parts, strict=True):
         assert (mine.name, mine.roles, mine.foot, mine.yaw) == (other.name, other.roles, other.foot, other.yaw)
         np.testing.assert_array_equal(mine.solid.vertices, other.solid.vertices)
@@ -132,7 +124,7 @@ def test_the_same_inputs_give_the_same_model(tmp_path):
 @pytest.mark.parametrize(("direction", "side"), [("+", -1), ("-", 1)])
 def test_a_signal_beside_the_carriageway_is_its_pole_and_faces_its_traffic(tmp_path, direction, side):
     """Traffic keeps to the right, so that the pole stands at its right and the mast arm reaches left."""
-    built = model(tmp_path, signals=SIGNAL.format(s=95, t=5 * side, to=direction, dynamic="yes"))
+    built = model_of_street(tmp_path, signals=SIGNAL.format(s=95, t=5 * side, to=direction, dynamic="yes"))
     (pole,) = with_role(built, Role.POLES)
     np.testing.assert_allclose(pole.foot, [-15, 5 * side, 0.12], atol=1e-6)
     arm_tip = placed(pole)[np.argmax(pole.solid.vertices[:, 0])]
@@ -162,7 +154,7 @@ def test_objects_of_the_map_become_what_they_are(tmp_path):
             ]
         )
     )
-    built = model(tmp_path, furniture=furniture)
+    built = model_of_street(tmp_path, furniture=furniture)
     house = part(built, "house")
     assert house.roles == (Role.OCCLUDERS,)
     assert plan(house).symmetric_difference(shapely.box(-36, 15, -24, 25)).area < 1e-6
@@ -185,7 +177,7 @@ def test_what_the_description_adds_stands_where_it_says(tmp_path):
         forbidden_areas=(Area("Church", shapely.box(20, 3, 25, 8)),),
         mandatory_areas=(Area("School", shapely.box(-25, 3, -20, 8)),),
     )
-    built = model(tmp_path, description)
+    built = model_of_street(tmp_path, description)
     assert part(built, "Building 1").solid.vertices[:, 2].max() == pytest.approx(12.0, abs=0.2)
     light = part(built, "Street light 1")
     assert light.foot[:2] == (0.0, 6.0)
@@ -197,7 +189,7 @@ def test_what_the_description_adds_stands_where_it_says(tmp_path):
 
 def test_an_area_far_larger_than_the_place_keeps_its_outline_in_few_triangles(tmp_path):
     large = shapely.box(-12_000, -12_000, 12_000, 12_000)
-    built = model(tmp_path, replace(HERE, forbidden_areas=(Area("Town", large),)))
+    built = model_of_street(tmp_path, replace(HERE, forbidden_areas=(Area("Town", large),)))
     solid = part(built, "Town").solid
     triangles = solid.vertices[np.array(solid.faces)]
     assert len(triangles) < 10_000
@@ -206,7 +198,7 @@ def test_an_area_far_larger_than_the_place_keeps_its_outline_in_few_triangles(tm
 
 
 def test_lines_are_painted_between_lanes_but_not_in_the_junction(tmp_path):
-    markings = part(model(tmp_path), "Lane markings").solid
+    markings = part(model_of_street(tmp_path), "Lane markings").solid
     assert (np.abs(markings.vertices[:, 0]) > 11).all()
     assert (np.abs(markings.vertices[:, 1]) < 0.1).all()
 
@@ -238,3 +230,20 @@ def test_a_tunnel_is_named_in_a_note(tmp_path):
     text = document(road(geometry(length=200.0), objects='<tunnel id="9" name="Hill" s="20" length="80"/>'))
     model = finish(site_model(read_text(tmp_path, text), SiteDescription(near=(100.0, 0.0), radius=50.0)))
     assert "tunnel Hill of road 1 is built as an open road, without its walls and its roof" in model.notes
+
+
+def test_the_middle_lies_on_a_road(tmp_path):
+    angle = [road(geometry(length=200.0)), road(geometry(length=80.0, hdg=np.pi / 2), number="2")]
+    x, y = read_text(tmp_path, document(*angle)).middle()
+    assert (x, y) == pytest.approx((100.0, 0.0), abs=10.0)
+    assert y == 0.0
+
+
+def test_the_title_of_a_site_names_the_map_and_the_junction_that_was_asked_for(tmp_path):
+    text = document(road(junction="5"), road(geometry(x=100.0), number="2"), rest='<junction id="5"/>')
+    road_map = read_text(tmp_path, text)
+    titles = {
+        place: finish(site_model(road_map, SiteDescription(**dict(place)))).name
+        for place in ((("junction", "5"),), (("near", (50.0, 0.0)),), (("junction", "5"), ("name", "Mill Lane")))
+    }
+    assert list(titles.values()) == ["map, junction 5", "map", "Mill Lane"]

@@ -1,10 +1,14 @@
+from collections import Counter
+
 import numpy as np
 import pytest
+import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 
 from seip_addon.core.geometry import solids
 from seip_addon.core.world.streetscape import street_furniture as furniture
+from seip_addon.core.world.streetscape.street_furniture import house
 from tests.oracles.random_cases import cases
 
 SIZES = st.floats(0.5, 40)
@@ -48,3 +52,35 @@ def test_a_tree_is_as_high_and_wide_as_asked_for(height, crown, variant):
 def test_posts_stand_on_their_foot(shape):
     assert shape.vertices[:, 2].min() == pytest.approx(0.0)
     assert volume(shape) > 0
+
+
+def is_closed(solid):
+    """Return whether each edge is used once in each direction."""
+    places = [tuple(np.round(vertex, 5)) for vertex in solid.vertices]
+    edges = Counter(
+        (places[a], places[b])
+        for face in solid.faces
+        for a, b in zip(face, (*face[1:], face[0]), strict=True)
+        if places[a] != places[b]
+    )
+    return all(number == edges[b, a] for (a, b), number in edges.items())
+
+
+coordinates = st.tuples(st.floats(-40, 40), st.floats(-40, 40))
+
+
+@given(
+    points=st.lists(coordinates, min_size=3, max_size=9),
+    hole=st.booleans(),
+)
+def test_every_outline_makes_a_closed_solid(points, hole):
+    outline = shapely.MultiPoint(points).convex_hull
+    if outline.geom_type != "Polygon" or outline.area < 1.0 or outline.buffer(-0.3).is_empty:
+        return
+    if hole and not outline.buffer(-2.0).is_empty:
+        outline = outline.difference(outline.buffer(-2.0))
+    solid = house(outline, 1.0, 6.0, side="wall")
+    assert is_closed(solid)
+    assert volume(solid) == pytest.approx(5 * outline.area, rel=1e-3)
+    assert (solid.vertices[:, 2].min(), solid.vertices[:, 2].max()) == (1.0, 6.0)
+    assert len(solid.faces) == len(solid.materials)

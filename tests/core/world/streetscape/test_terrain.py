@@ -4,7 +4,7 @@ import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 
-from seip_addon.core.world.streetscape.terrain import MAX_ROADSIDE, Embankments, Terrain, cut, triangulate
+from seip_addon.core.world.streetscape.terrain import MAX_ROADSIDE, Embankments, Terrain, cut
 from tests.oracles.random_cases import cases
 
 SQUARE = np.array([[[0, 0, 1], [4, 0, 1], [4, 4, 3]], [[0, 0, 1], [4, 4, 3], [0, 4, 3]]], dtype=float)
@@ -23,37 +23,16 @@ def test_height_on_a_plane_is_the_planes(x, y):
     assert Terrain(SQUARE).height(np.array([[x, y]]))[0] == pytest.approx(1 + y / 2)
 
 
-def test_triangles_fill_an_area_once_and_face_up():
-    holed = L_SHAPE.difference(shapely.box(1, 1, 2, 2))
-    area = plan_area(triangulate(holed))
-    assert (area > 0).all()
-    assert area.sum() == pytest.approx(holed.area)
-
-
 @given(st.floats(0.7, 20), st.floats(-50, 50), st.floats(-50, 50))
 @cases(25)
 def test_draping_keeps_the_area_wherever_the_grid_falls(spacing, x, y):
-    area = shapely.affinity.translate(L_SHAPE, x, y)
+    area = shapely.affinity.translate(L_SHAPE.difference(shapely.box(1, 1, 2, 2)), x, y)
     ground = SQUARE * [100, 100, 1] - [200, 200, 0]
     triangles = Terrain(ground).drape(area, spacing=spacing, above=0.25)
+    assert (plan_area(triangles) > 0).all()
     assert plan_area(triangles).sum() == pytest.approx(area.area, abs=1e-3)
     expected = 1 + (triangles[..., 1] + 200) / 200 + 0.25
     np.testing.assert_allclose(triangles[..., 2], expected, atol=1e-9)
-
-
-def test_a_draped_area_has_no_cracks():
-    """Each inner edge belongs to exactly two triangles: what is left over is the outline."""
-    triangles = Terrain(SQUARE).drape(L_SHAPE, spacing=2.0)
-    corners = np.round(triangles, 9)
-    edges = {}
-    for a, b, c in corners:
-        for start, stop in ((a, b), (b, c), (c, a)):
-            key = (tuple(start), tuple(stop))
-            edges[key] = edges.get(key, 0) + 1
-    assert set(edges.values()) == {1}
-    open_edges = [(start, stop) for start, stop in edges if (stop, start) not in edges]
-    length = sum(np.hypot(stop[0] - start[0], stop[1] - start[1]) for start, stop in open_edges)
-    assert length == pytest.approx(L_SHAPE.length)
 
 
 @given(st.floats(-1, 5), st.floats(0.1, 3))
