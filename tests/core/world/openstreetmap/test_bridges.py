@@ -9,7 +9,6 @@ import shapely
 from seip_addon.core.base.errors import SeipError
 from seip_addon.core.base.progress import finish
 from seip_addon.core.geometry.plan import surface_height
-from seip_addon.core.site.roles import Role
 from seip_addon.core.site.scene_geometry import OTHER_LEVELS
 from seip_addon.core.workflows.site_building import SiteRequest, build_site
 from seip_addon.core.world.elevation.at_place import TerrainRequest
@@ -107,39 +106,6 @@ def check(streets, most=STEEPEST):
     assert max(np.abs(np.diff(one)).max() for one in heights) < most * STEP + ROUNDING
     assert max(map(grades, lanes_of(streets))) < 0.12  # inside a bend a lane is shorter than the road
     assert max(gaps(streets)) < GAP
-
-
-@pytest.mark.parametrize("half", [10.0, pytest.param(40.0, marks=pytest.mark.slow)])
-def test_a_short_bridge_is_as_high_as_it_needs_and_its_ramps_are_gentle(tmp_path, half):
-    extract = Extract()
-    bridge(extract, half)
-    trunk(extract)
-    site, streets = built(extract, tmp_path, level=("Trunk Road",))
-    check(streets, most=0.065)
-    assert clearances(streets, "High Road", "Trunk Road")
-    assert min(clearances(streets, "High Road", "Trunk Road")) > ROAD_CLEARANCE - 0.05
-    assert max(lane.left[:, 2].max() for lane in lanes_of(streets)) < ROAD_CLEARANCE + 0.1
-    assert not any("steeper" in warning or "differ in height" in warning for warning in site.model.warnings)
-
-
-def test_slip_roads_of_an_exit_climb_to_the_bridge(tmp_path):
-    extract = Extract()
-    for x, ends in ((-8, (300, -300)), (8, (-300, 300))):
-        side = -1 if x < 0 else 1
-        extract.way(
-            [(x, ends[0]), (x, side * -180), (x, side * 180), (x, ends[1])], highway="motorway", name="A 1", lanes=2
-        )
-        extract.way([(x, side * -180), (3 * x, side * -90), (60 * side, 0)], highway="motorway_link")
-        extract.way([(60 * side, 0), (3 * x, side * 90), (x, side * 180)], highway="motorway_link")
-    tags = {"highway": "secondary", "name": "Cross Road", "lanes": 2}
-    extract.way([(-300, 0), (-60, 0), (-18, 0)], **tags)
-    extract.way([(-18, 0), (18, 0)], bridge="yes", layer="1", **tags)
-    extract.way([(18, 0), (60, 0), (300, 0)], **tags)
-    site, streets = built(extract, tmp_path, level=("Cross Road",))
-    check(streets)
-    assert min(clearances(streets, "Cross Road", "A 1")) > ROAD_CLEARANCE - 0.05
-    assert max(abs(lane.left[:, 2]).max() for lane in lanes_of(streets, "A 1")) < 0.5
-    assert not any("flat" in note for note in site.model.notes)
 
 
 def test_an_underpass_is_lowered_under_a_street_that_stays(tmp_path):
@@ -271,16 +237,6 @@ def check_exit(seed, tmp_path):
 )
 def test_random_exits_have_gentle_grades_and_no_steps(tmp_path, seed):
     check_exit(seed, tmp_path)
-
-
-def test_a_bridge_is_in_the_way_of_what_lies_below(tmp_path):
-    extract = Extract()
-    bridge(extract)
-    trunk(extract)
-    site, _ = built(extract, tmp_path, level=("Trunk Road",))
-    deck = next(part for part in site.model.parts if part.name == "Roads above")
-    assert deck.solid.vertices[:, 2].max() + site.model.origin[2] == pytest.approx(ROAD_CLEARANCE, abs=0.01)
-    assert deck.roles == (Role.OCCLUDERS,)
 
 
 def surfaces(model, *names):
