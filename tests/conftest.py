@@ -36,6 +36,14 @@ def pytest_unconfigure(config):
 
 
 @pytest.fixture(scope="session")
+def example():
+    """The small junction with three sensors, which nobody changes."""
+    from tests.builders.small_junction import make_example  # noqa: PLC0415 -- most tests do without it
+
+    return make_example()
+
+
+@pytest.fixture(scope="session")
 def small_scene(tmp_path_factory):
     """A scene that every command runs on in a moment, with traffic beside it."""
     pytest.importorskip("bpy")

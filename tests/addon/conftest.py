@@ -23,6 +23,11 @@ def add_on(tmp_path, monkeypatch):
 
 
 @pytest.fixture
+def scene(add_on):
+    return bpy.context.scene
+
+
+@pytest.fixture
 def junction(add_on, small_scene):
     """The small junction, open, with settings under which several sensors of one type are worth placing."""
     bpy.ops.wm.open_mainfile(filepath=str(small_scene))
@@ -35,6 +40,13 @@ def junction(add_on, small_scene):
     for one in scene.seip.survey.types:
         one.use = one.name == "type1"
     return scene
+
+
+@pytest.fixture
+def placed(junction):
+    """The small junction with sensors."""
+    bpy.ops.seip.solve_placement()
+    return junction
 
 
 @pytest.fixture

@@ -21,11 +21,6 @@ LINK = "https://www.openstreetmap.org/#map=19/52.50001/13.40001"
 
 
 @pytest.fixture
-def scene(add_on):
-    return bpy.context.scene
-
-
-@pytest.fixture
 def stand_in(monkeypatch, tmp_path, online):
     """A server that is named in the preferences."""
     monkeypatch.delenv("http_proxy", raising=False)

@@ -30,11 +30,6 @@ SCENES = Path(__file__).resolve().parents[2] / "scenes"
 
 
 @pytest.fixture
-def scene(add_on):
-    return bpy.context.scene
-
-
-@pytest.fixture
 def fresh(add_on):
     """Blender as it starts, with cube, light and camera."""
     bpy.ops.wm.read_homefile(use_factory_startup=True)

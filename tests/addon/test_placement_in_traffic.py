@@ -79,30 +79,16 @@ def test_runs_are_read_in_work_that_can_be_stopped(coarse):
     assert not coarse.seip.result.record
 
 
-def other_place(folder):
-    far = make_run(1, 30.0)
-    far.position[:] += 9000.0
-    far.save(folder / "run-1.npz")
-    make_run(2, 30.0).save(folder / "run-2.npz")
-
-
 def copies(folder):
     for number in (1, 2):
         make_run(1, 30.0).save(folder / f"run-{number}.npz")
-
-
-def damaged(folder):
-    copies(folder)
-    (folder / "run-2.npz").write_bytes(b"PK")
 
 
 @pytest.mark.parametrize(
     ("wrong", "words"),
     [
         (shutil.rmtree, r"there is no run of traffic \(\.npz\) in .*runs: choose another folder, or make two or more"),
-        (other_place, "traffic of another place"),
         (copies, r"run-1\.npz and .*run-2\.npz are nearly the same traffic"),
-        (damaged, r"run-2\.npz is damaged.*file of trajectories.*import or simulate them again"),
     ],
 )
 def test_runs_that_are_of_no_use_are_refused_before_any_ray_is_cast(coarse, tmp_path, wrong, words):

@@ -71,14 +71,6 @@ def test_a_catalogue_of_one_s_own(survey, own, catalogue):
         bpy.ops.seip.remove_catalogue(index=3)
 
 
-def test_a_bad_catalogue_is_refused(survey, own, tmp_path):
-    path = tmp_path / "bad.toml"
-    path.write_text("[x]\nname = 1\n", encoding="utf-8")
-    with pytest.raises(RuntimeError, match="manufacturer is missing"):
-        bpy.ops.seip.add_catalogue(filepath=str(path))
-    assert preferences.catalogue_files() == ()
-
-
 def test_a_sensor_is_dropped_and_shown(survey):
     survey.types["vlp16"].use = True
     sections = bpy.context.window_manager.seip_sections

@@ -22,11 +22,6 @@ SCENES = Path(__file__).resolve().parents[2] / "scenes"
 MAP = SCENES / "junction.xodr"
 
 
-@pytest.fixture
-def scene(add_on):
-    return bpy.context.scene
-
-
 def choose(scene, path=MAP, radius=30.0):
     assert bpy.ops.seip.choose_map(filepath=str(path)) == {"FINISHED"}
     site = scene.seip.site
@@ -98,15 +93,10 @@ def test_a_site_of_a_map_without_obstacles_says_so_where_sensors_are_placed(scen
     assert bare not in " ".join(layout.text.split())
 
 
-@pytest.mark.parametrize(
-    ("text", "complaint"), [(None, "no such file"), ("<x/>", "is not OpenDRIVE"), ("<x", "broken XML")]
-)
-def test_a_bad_map_is_one_sentence(scene, tmp_path, text, complaint):
-    path = tmp_path / "map.xodr"
-    if text is not None:
-        path.write_text(text, encoding="utf-8")
-    with pytest.raises(RuntimeError, match=complaint):
-        bpy.ops.seip.choose_map(filepath=str(path))
+def test_a_bad_map_is_one_sentence(scene, tmp_path):
+    (tmp_path / "map.xodr").write_text("<x/>", encoding="utf-8")
+    with pytest.raises(RuntimeError, match="is not OpenDRIVE"):
+        bpy.ops.seip.choose_map(filepath=str(tmp_path / "map.xodr"))
     assert not scene.seip.site.source
 
 

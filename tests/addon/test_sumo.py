@@ -16,11 +16,6 @@ BUTTON = f"Install SUMO ({sumo_size().download} MB)"
 
 
 @pytest.fixture
-def scene(add_on):
-    return bpy.context.scene
-
-
-@pytest.fixture
 def machine(tmp_path, monkeypatch, online):
     """A machine without SUMO, whose pip has a stand-in, and an extension with an empty folder of its own."""
     monkeypatch.setenv("PATH", "/usr/bin:/bin")

@@ -1,17 +1,28 @@
 """Verification from the panel: what it finds in a simulated recording, writes, and adds to the scene."""
 
+from __future__ import annotations
+
 import json
 import re
 import shutil
+from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 
 import bpy
 import numpy as np
 import pytest
 
+from seip_addon.core.base.progress import finish
+from seip_addon.core.output.datasets.formats import POINT_TYPE, encode
 from seip_addon.core.output.results.verification_record import load_verification
 from seip_addon.core.sensing.lidar.catalogue import load_catalogue
-from seip_addon.core.site.scene_geometry import Mesh
+from seip_addon.core.sensing.scans.sensor import MountedSensor
+from seip_addon.core.sensing.scans.simulation import ScanSettings, prepare
+from seip_addon.core.sensing.scans.static_scene import static_scene
+from seip_addon.core.sensing.traffic.bodies import fitted_body
+from seip_addon.core.sensing.traffic.trajectories import Trajectories
+from seip_addon.core.site.scene_geometry import Mesh, SceneGeometry
 from seip_addon.core.workflows.verifying import verify
 from seip_addon.panel import verification as panel
 from seip_addon.panel.session import session
@@ -20,9 +31,45 @@ from seip_addon.scene import contract
 from seip_addon.scene.read import read_scene
 from seip_addon.scene.sensors import read_sensors
 from tests.builders.drawn_layout import DrawnLayout
-from tests.builders.site_recording import changed, save_site_recording
 from tests.builders.small_junction import box_triangles
 from tests.builders.small_scene import make_run
+
+EVERY = 1.2  # seconds between sweeps
+
+
+def save_site_recording(
+    folder: Path,
+    geometry: SceneGeometry,
+    sensors: Sequence[MountedSensor],
+    traffic: Trajectories,
+    *,
+    sweeps: int = 20,
+    seed: int = 0,
+) -> Path:
+    """Write sweeps of sensors in their own axes, a folder of PCD files for each; traffic is in local axes."""
+    bodies = [fitted_body(user) for user in traffic.users]
+    static = static_scene(geometry, sensors)
+    simulation = finish(prepare(static, sensors, traffic, bodies, ScanSettings(seed)))
+    for number in range(sweeps):
+        frame = simulation.frame(number, EVERY * number)
+        for row, sensor in enumerate(sensors):
+            own = frame.sensor == row
+            points = np.column_stack([(frame.points[own] - sensor.xyz) @ sensor.orientation, frame.intensity[own]])
+            path = folder / sensor.label / f"{number:06d}.pcd"
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_bytes(encode(np.ascontiguousarray(points.astype("<f4")).view(POINT_TYPE)[:, 0]))
+    for sensor in sensors:
+        times = "\n".join(str(EVERY * number) for number in range(sweeps))
+        (folder / sensor.label / "timestamps.txt").write_text(times, encoding="utf-8")
+    return folder
+
+
+def changed(geometry: SceneGeometry, gone: str, new: Sequence[Mesh]) -> SceneGeometry:
+    """Return a site without one of its occluders and with others."""
+    others = tuple(mesh for mesh in geometry.occluders if mesh.name != gone)
+    assert len(others) == len(geometry.occluders) - 1
+    return replace(geometry, occluders=(*others, *new))
+
 
 SHIFT = np.array([0.3, -0.2, 0.15])
 KIOSK = Mesh("kiosk", box_triangles((9.0, -13.0, 0.0), (11.0, -11.5, 3.0)))
@@ -150,31 +197,11 @@ def test_stopped_work_leaves_nothing(placed, tmp_path):
     assert session.of(placed).verification is None
 
 
-def no_sensors(scene, folder):
-    bpy.data.batch_remove(bpy.data.collections["SEIP Sensors"].objects)
-
-
-def no_such_recording(scene, folder):
-    scene.seip.verification.recording = str(folder / "nowhere")
-
-
-def other_names(scene, folder):
-    shutil.copytree(scene.seip.verification.recording, folder / "other")
-    (folder / "other" / "S2").rename(folder / "other" / "north")
-    scene.seip.verification.recording = str(folder / "other")
-
-
-@pytest.mark.parametrize(
-    ("wrong", "words"),
-    [
-        (no_sensors, "There is no sensor in the scene: place sensors first"),
-        (no_such_recording, "no such file or folder: .*nowhere"),
-        (other_names, "the plan has the sensors S1, S2, but the recording has north"),
-    ],
-)
-def test_each_mistake_has_its_sentence(placed, tmp_path, wrong, words):
-    wrong(placed, tmp_path)
-    with pytest.raises(RuntimeError, match=words):
+def test_a_recording_of_other_sensors_is_refused(placed, tmp_path):
+    shutil.copytree(placed.seip.verification.recording, tmp_path / "other")
+    (tmp_path / "other" / "S2").rename(tmp_path / "other" / "north")
+    placed.seip.verification.recording = str(tmp_path / "other")
+    with pytest.raises(RuntimeError, match="the plan has the sensors S1, S2, but the recording has north"):
         bpy.ops.seip.verify()
     assert not (tmp_path / "out").exists()
     assert session.of(placed).verification is None

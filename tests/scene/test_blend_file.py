@@ -1,6 +1,7 @@
 """What is saved opens again, and looks right at once."""
 
 import re
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -10,6 +11,7 @@ import pytest
 
 from seip_addon.core.base.errors import SeipError
 from seip_addon.scene.blend_file import new_file, open_blend, save_blend
+from seip_addon.scene.interrupts import held_signals
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -83,3 +85,25 @@ def test_a_damaged_name_is_refused(tmp_path, kind):
     path.write_bytes(path.read_bytes().replace(name, b"\xd0" * len(name)))
     with pytest.raises(SeipError, match=f"damaged: among its {kind} is a name that is not UTF-8"):
         open_blend(path)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_signals_are_delivered_when_the_block_ends(number):
+    reached = []
+
+    def held():
+        with held_signals():
+            signal.raise_signal(number)
+            reached.append("the end")
+
+    def stop(_number, _frame):
+        raise SystemExit
+
+    before = signal.signal(number, stop)
+    try:
+        with pytest.raises(SystemExit):
+            held()
+        assert signal.getsignal(number) is stop
+    finally:
+        signal.signal(number, before)
+    assert reached

@@ -7,7 +7,12 @@ import numpy as np
 import pytest
 
 from seip_addon.core.base.errors import SeipError
+from seip_addon.core.base.progress import finish
+from seip_addon.core.site.candidates import CandidateSettings
+from seip_addon.core.site.check import check_site
+from seip_addon.core.site.site import make_site
 from seip_addon.scene import contract
+from seip_addon.scene.check import contents_of
 from seip_addon.scene.read import read_scene
 
 
@@ -224,3 +229,60 @@ def test_a_missing_library_is_named(scene, tmp_path):
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "site.blend"))
     with pytest.raises(SeipError, match=r"is linked from .*library\.blend, which is not there"):
         read_scene(bpy.context.scene)
+
+
+@pytest.fixture
+def paved(scene):
+    sheet(scene, "pavement", (contract.CANDIDATE_AREAS, contract.GROUND), 60, 2, (0, 10, 0))
+    return scene
+
+
+def cube(name, at, side):
+    bpy.ops.mesh.primitive_cube_add(size=side, location=at)
+    bpy.context.object.name = name
+    return bpy.context.object
+
+
+def lay_out(geometry):
+    return make_site(geometry, CandidateSettings(), 2.0), ()
+
+
+def problems(scene):
+    return [(p.severity, p.obj, p.text) for p in finish(check_site(contents_of(scene), lay_out)).problems]
+
+
+def only(scene):
+    (problem,) = problems(scene)
+    return problem
+
+
+def test_a_sound_scene_has_no_problem_and_is_laid_out(paved):
+    checked = finish(check_site(contents_of(paved), lay_out))
+    assert checked.problems == ()
+    site = make_site(read_scene(paved).geometry, CandidateSettings(), 2.0)
+    assert checked.counts["Targets"].startswith(f"{len(site.targets):,},")
+    assert checked.counts["Poses"] == f"{len(site.candidates):,}"
+
+
+def test_all_faults_are_listed_where_reading_stops_at_the_first(paved):
+    broken = sheet(paved, "broken", (contract.OCCLUDERS,), 1, 1, (0, 20, 0))
+    broken.data.vertices[0].co.x = float("nan")
+    sheet(paved, "flat", (contract.OCCLUDERS,), 0, 0, (0, 20, 0))
+    put(paved, bpy.data.objects.new("bare", bpy.data.meshes.new("bare")), (contract.GROUND,))
+    weighted = sheet(paved, "weighted", (contract.WEIGHTED_REGIONS,), 3, 3)
+    weighted["seip_weight"] = "heavy"
+    found = problems(paved)
+    assert {(severity, obj) for severity, obj, _ in found} == {
+        ("ERROR", name) for name in ("broken", "flat", "bare", "weighted")
+    }
+    with pytest.raises(SeipError):
+        read_scene(paved)
+
+
+def test_a_large_object_without_a_role(paved):
+    house = cube("house", (0, 30, 5), 10)
+    cube("far away", (0, 900, 5), 10)
+    cube("small", (0, 20, 0), 1)
+    assert only(paved)[:2] == ("WARNING", "house")
+    contract.find_or_make(paved, contract.OCCLUDERS).objects.link(house)
+    assert problems(paved) == []

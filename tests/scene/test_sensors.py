@@ -18,15 +18,9 @@ from seip_addon.scene.read import read_scene
 from seip_addon.scene.sensors import changed_beams, labelled_sensors, read_sensors
 from seip_addon.scene.write import write_result
 from tests.builders.scene_by_hand import make_scene
-from tests.builders.small_junction import make_example
 from tests.oracles.full_scan import beam_directions
 
 CATALOGUE = load_catalogue()
-
-
-@pytest.fixture(scope="module")
-def example():
-    return make_example()
 
 
 @pytest.fixture

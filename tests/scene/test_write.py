@@ -15,12 +15,6 @@ from seip_addon.scene.materials import linear
 from seip_addon.scene.render import labelled_pictures, raw_files, shots_of, take
 from seip_addon.scene.write import LIFT, clear_result, shown_legend, write_result
 from tests.builders.scene_by_hand import make_scene
-from tests.builders.small_junction import make_example
-
-
-@pytest.fixture(scope="module")
-def example():
-    return make_example()
 
 
 @pytest.fixture

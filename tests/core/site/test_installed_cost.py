@@ -10,12 +10,7 @@ from seip_addon.core.choosing.placement.deployment import pose_prices
 from seip_addon.core.choosing.placement.objective import Objective
 from seip_addon.core.site.installed_cost import load_installed_cost
 from seip_addon.core.workflows.placing import optimise
-from tests.builders.small_junction import Example, make_example
-
-
-@pytest.fixture(scope="module")
-def example() -> Example:
-    return make_example()
+from tests.builders.small_junction import Example
 
 
 def counted(example, cost, bracket=0.4) -> Example:

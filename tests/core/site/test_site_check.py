@@ -11,12 +11,7 @@ from seip_addon.core.site.candidates import CandidateSettings
 from seip_addon.core.site.check import SceneContents, Surface, check_site
 from seip_addon.core.site.scene_geometry import Mesh, Pole, SceneGeometry
 from seip_addon.core.site.site import make_site
-
-
-def sheet(low_x, low_y, high_x, high_y, z=0.0):
-    a, b, c, d = (low_x, low_y, z), (high_x, low_y, z), (high_x, high_y, z), (low_x, high_y, z)
-    return np.array([(a, b, c), (a, c, d)], dtype=float)
-
+from tests.builders.plain_street import sheet
 
 ROAD = Surface("roads", "road", sheet(-50, -4, 50, 4))
 REGION = Surface("region", "region", sheet(-30, -5, 30, 5, 0.03))

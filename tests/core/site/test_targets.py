@@ -5,9 +5,12 @@ import pytest
 import shapely
 
 from seip_addon.core.base.errors import SeipError
-from seip_addon.core.geometry.plan import surface_height
-from seip_addon.core.site.scene_geometry import NamedArea
+from seip_addon.core.site.obstruction import NO_OBSTACLES_MESSAGE
+from seip_addon.core.site.scene_geometry import Mesh, NamedArea, Pole
 from seip_addon.core.site.targets import generate_targets
+from seip_addon.core.workflows.survey import lay_out
+from seip_addon.core.workflows.survey_settings import SurveySettings
+from tests.builders.plain_street import PLAIN, block, street
 
 
 def rectangle(low_x, low_y, high_x, high_y, slope=0.0):
@@ -29,14 +32,6 @@ def test_targets_off_the_road_are_left_out():
     assert len(targets) == 5 * 10
 
 
-def test_the_highest_of_two_roads_counts():
-    bridge = rectangle(0, 0, 10, 10) + np.array((0, 0, 6))
-    surfaces = np.concatenate((rectangle(0, 0, 10, 10), bridge))
-    assert surface_height(np.array([[5.0, 5.0], [20.0, 5.0]]), surfaces).tolist() == pytest.approx(
-        [6, np.nan], nan_ok=True
-    )
-
-
 def test_weights_multiply_where_regions_overlap():
     regions = (NamedArea("a", shapely.box(-1, -1, 2, 9), 2.0), NamedArea("b", shapely.box(1, -1, 9, 9), 3.0))
     targets = generate_targets(shapely.box(0, 0, 4, 0.5), rectangle(-9, -9, 9, 9), 1.0, regions)
@@ -56,3 +51,22 @@ def test_weights_multiply_where_regions_overlap():
 def test_each_fault_has_its_sentence(region, spacing, sentence):
     with pytest.raises(SeipError, match=sentence):
         generate_targets(region, rectangle(-10, -10, 10, 10), spacing)
+
+
+SETTINGS = SurveySettings(candidates=PLAIN)
+POLE = Pole("mast", np.array((0.0, 9.0, 0.1)), 6.0)
+
+
+@pytest.mark.parametrize(
+    ("occluders", "bare"),
+    [
+        ((), True),
+        ((Mesh("mast", block((-0.1, 8.9, 0.1), (5.0, 9.1, 6.0))),), True),
+        ((Mesh("bollard", block((5, 8, 0), (5.2, 8.2, 1.4))),), True),
+        ((Mesh("wall", block((5, 8, 0), (9, 9, 1.6))),), False),
+    ],
+)
+def test_only_what_is_high_and_wide_hides_anything(occluders, bare):
+    """The scene has one pole; its own mesh does not count."""
+    layout = lay_out(street(poles=(POLE,), occluders=occluders), SETTINGS)
+    assert layout.warnings.count(NO_OBSTACLES_MESSAGE) == bare
