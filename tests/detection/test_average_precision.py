@@ -3,10 +3,13 @@
 import math
 from dataclasses import replace
 
+from headless.detection.rules import RULES, precisions
+
 import numpy as np
 import pytest
+import scipy.stats
 
-from tests.builders.labelled_frames import box, detected, frame, traffic, truth
+from tests.builders.labelled_frames import SIZES, box, detected, frame, near_and_far, traffic, truth, values
 
 pytest.importorskip("torch", reason="the detector's torch is optional")
 
@@ -17,9 +20,11 @@ from headless.detection.average_precision import (
     average_precision_interval,
     balanced_score,
     evaluate,
+    jackknife_reach,
     precision_recall,
     too_few_runs,
 )
+from headless.detection.breakdown import average_precision_by, recall_by_category
 from headless.detection.matching import Rule, match
 
 AT_07 = Rule()
@@ -122,9 +127,6 @@ def test_agrees_with_the_lyft_kit(iou):
         assert ours == pytest.approx(theirs, abs=1e-6)
 
 
-# Properties -------------------------------------------------------------------------------------------------------
-
-
 # Its interval -----------------------------------------------------------------------------------------------------
 
 
@@ -172,3 +174,70 @@ def test_too_few_runs_give_no_interval_and_a_sentence():
     assert not too_few_runs(4)
     cars = np.array([10, 10, 10, 0, 0, 0])  # runs without any show nothing of how runs differ
     assert average_precision_interval(found_of(cars, cars)) is None
+
+
+def test_recall_by_category():
+    there = truth([box(0), box(20), box(40), box(60)], category=["car", "truck", "truck", "pedestrian"])
+    found = detected([box(0), box(20), box(40)], [0.9, 0.6, 0.4], category=["car", "truck", "truck"])
+    evaluation = evaluate([frame(there, found)], AT_07)
+    assert recall_by_category(evaluation, 0.5) == {"car": (1.0, 1), "truck": (0.5, 2)}
+    assert recall_by_category(evaluation, 0.95) == {"car": (0.0, 1), "truck": (0.0, 2)}
+
+
+def test_average_precision_by_distance():
+    """Near: hit, false, hit of two: 1/2 · 1 + 1/2 · 2/3. Far: false, hit of two: 1/2 · 1/2. The box of the far hit
+    lies at 39 m, but the car it found at 45 m."""
+    bins = average_precision_by(evaluate([near_and_far()], AT_07), "distance", (0, 40, 60, 100))
+    assert [(one.low, one.high, one.wanted) for one in bins] == [(0, 40, 2), (40, 60, 2), (60, 100, 0)]
+    assert values(bins) == [5 / 6, 1 / 4, None]
+
+
+def test_jackknife_of_a_mean_is_students_interval():
+    values = np.random.default_rng(3).normal(size=9)
+    left_out = np.array([np.delete(values, row).mean() for row in range(9)])
+    low, high = scipy.stats.t.interval(0.95, 8, values.mean(), scipy.stats.sem(values))
+    assert jackknife_reach(left_out) == pytest.approx((high - low) / 2)
+
+
+PLACES = [0.0, 30.0, 60.0, 90.0]
+
+
+def street(runs=4):
+    """Runs of a frame each: two cars drive, of two parked ones one is found; a van and a pedestrian are found."""
+    told = []
+    for number in range(runs):
+        cars, van, person = (
+            [box(x) for x in PLACES],
+            box(120.0, size=SIZES["van"]),
+            box(150.0, size=SIZES["pedestrian"]),
+        )
+        there = truth(
+            [*cars, van, person],
+            category=["car", "car", "car", "car", "van", "pedestrian"],
+            parked=[False, False, True, True, False, False],
+        )
+        found = detected([*cars[:3], van, person], [0.9, 0.8, 0.7, 0.6, 0.5], category=["car"] * 4 + ["pedestrian"])
+        told.append(frame(there, found, run=f"run {number}"))
+    return told
+
+
+def test_moving_and_parked_are_evaluated_apart_and_neither_punishes_the_other():
+    found = precisions(street())
+    moving, parked = found["bev_0.7_moving"], found["bev_0.7_parked"]
+    assert (moving.average_precision, moving.road_users) == (1.0, 12)
+    assert (parked.average_precision, parked.road_users) == (0.5, 8)
+    assert found["bev_0.7"].average_precision == pytest.approx(4 / 5)
+
+
+def test_each_class_is_evaluated_at_its_own_overlap():
+    found = precisions(street())
+    assert (found["car_van_0.7"].road_users, found["pedestrian_0.5"].road_users) == (20, 4)
+    assert found["pedestrian_0.5"].average_precision == 1.0
+    assert (RULES["motorcycle_bicycle_0.5"].iou, RULES["pedestrian_0.5"].iou, RULES["truck_bus_0.7"].iou) == (
+        0.5,
+        0.5,
+        0.7,
+    )
+    assert found["truck_bus_0.7"].road_users == 0
+    assert math.isnan(found["truck_bus_0.7"].average_precision)
+    assert found["truck_bus_0.7"].interval is None

@@ -79,12 +79,6 @@ def test_files_of_other_versions_and_detectors_are_refused(detector, copied, cha
         Confidence.of_detector(path.with_name("shipped.pt"), detector)
 
 
-def test_a_folder_in_place_of_the_file_is_refused(detector, tmp_path):
-    (tmp_path / "shipped.confidence.json").mkdir()
-    with pytest.raises(SeipError, match=r"cannot read shipped.confidence.json: Is a directory; fit it again"):
-        Confidence.of_detector(tmp_path / "shipped.pt", detector)
-
-
 def test_the_fit_recovers_a_map_and_removes_the_calibration_error():
     random = np.random.default_rng(5)
     score, category = random.uniform(0.05, 0.95, 40_000), random.integers(0, len(CLASSES), 40_000)

@@ -3,9 +3,19 @@
 from headless.detection.detection_area import area_of
 
 import numpy as np
+import shapely
 
-from tests.builders.sloping_road import hill
+from seip_addon.core.site.scene_geometry import Mesh, SceneGeometry
 from tests.builders.street_clouds import cloud_frame
+
+
+def hill(slope=0.06, across=0.02, base=100.0, half=24.0):
+    """A square road that rises to the east and a little to the north."""
+    corners = np.array([[x, y, base + slope * x + across * y] for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))])
+    corners[:, :2] *= half
+    corners[:, 2] = base + slope * corners[:, 0] + across * corners[:, 1]
+    road = Mesh("road", corners[[[0, 1, 2], [0, 2, 3]]])
+    return SceneGeometry("Hill", np.zeros(3), (road,), (), (), shapely.box(-16, -16, 16, 16))
 
 
 def test_heights_are_those_above_the_road():

@@ -2,6 +2,7 @@
 
 from headless.detection.detector import Detector, TrainingRecord, save_state
 from headless.detection.settings import NetworkSettings
+from headless.detection.suitability import suitability_warnings
 
 import pytest
 import torch
@@ -46,3 +47,19 @@ def test_detectors_that_make_no_sense_are_refused(stored, change, sentence):
         Detector.load(written(stored, change))
     assert sentence in str(refusal.value)
     assert "\n" not in str(refusal.value)
+
+
+KNOWN = TrainingRecord(("type1", "type2"), ("Junction",))
+
+
+def detector(training_record=KNOWN):
+    return Detector(NETWORK, seed=1, training_record=training_record)
+
+
+def test_it_is_quiet_at_home():
+    assert suitability_warnings(detector(), ["type1", "type1"], "Junction") == ()
+
+
+def test_other_sensor_types_are_named():
+    (sentence,) = suitability_warnings(detector(), ["type3", "type1"], "Junction")
+    assert "trained on clouds of type1 and type2, not of type3:" in sentence

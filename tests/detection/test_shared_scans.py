@@ -1,8 +1,13 @@
 """Scans that placements share: the frames are those of each placement alone."""
 
+import threading
 from dataclasses import fields
 
+from headless.detection.detector_evaluation import side_by_side
+
 import pytest
+
+from seip_addon.core.base.progress import Progress, finish
 
 pytest.importorskip("torch", reason="torch is not installed: make detection")
 
@@ -13,7 +18,6 @@ from headless.options import new_parser
 
 import numpy as np
 
-from seip_addon.core.base.progress import finish
 from seip_addon.core.choosing.placement.deployment import sensor_at
 from seip_addon.core.sensing.scans.frame import Labels
 from seip_addon.core.sensing.scans.sensor import MountedSensor
@@ -55,3 +59,45 @@ def test_runs_that_have_no_such_frames_are_left_out(surveyed, small_scene, tmp_p
     runs = sampled_runs(survey.runs_beside(small_scene)[:2], surveyed.geometry.origin, 3.0)
     shared = SharedScans(Simulator(surveyed.geometry, ScanSettings()), [MountedSensors("none", ())] * 2)
     assert finish(detect_with_all(shared, runs, None, tmp_path, instants=slice(len(runs[0].times), None))) == [[], []]
+
+
+def counting(steps, name, seen=None):
+    for done in range(steps):
+        if seen is not None:
+            seen.append(name)
+        yield Progress(done, steps, name)
+    return name
+
+
+def endless(stopped):
+    pause = threading.Event()
+    try:
+        while not pause.wait(0.001):
+            yield Progress(0, 1, "endless")
+    finally:
+        stopped.set()
+
+
+def test_results_come_in_the_order_of_the_works():
+    works = [counting(30 - 10 * number, str(number)) for number in range(3)]
+    assert finish(side_by_side(works, 2)) == ["0", "1", "2"]
+
+
+def test_a_work_that_fails_stops_the_others():
+    stopped = threading.Event()
+
+    def failing():
+        yield Progress(0, 1, "fail")
+        raise ValueError("broken")
+
+    with pytest.raises(ValueError, match="broken"):
+        finish(side_by_side([endless(stopped), failing()], 2))
+    assert stopped.wait(10)
+
+
+def test_stopping_stops_all():
+    stopped = [threading.Event(), threading.Event()]
+    steps = side_by_side([endless(one) for one in stopped], 2)
+    next(steps)
+    steps.close()
+    assert all(one.wait(10) for one in stopped)

@@ -94,12 +94,3 @@ def write_all(folder, study):
 
 def read_table(path):
     return list(csv.DictReader(path.read_text(encoding="utf-8").splitlines()))
-
-
-@pytest.mark.slow
-def test_pictures_and_tables_are_the_same_bytes_each_time(study, tmp_path):
-    for name in ("one", "two"):
-        write_all(tmp_path / name, study)
-    for path in (tmp_path / "one").iterdir():
-        assert path.read_bytes() == (tmp_path / "two" / path.name).read_bytes()
-    assert len(read_table(tmp_path / "one" / "coverage.csv")) == len(study.cells)

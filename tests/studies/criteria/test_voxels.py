@@ -15,9 +15,9 @@ import numpy as np
 from seip_addon.core.geometry.orientation import orientation
 from seip_addon.core.sensing.lidar.catalogue import load_catalogue
 from seip_addon.core.sensing.scans.scanner import ReflectiveSurface
-from seip_addon.core.sensing.traffic.trajectories import RoadUser, Trajectories
 from seip_addon.core.sensing.visibility.ray_casting import make_ray_caster
 from seip_addon.core.site.site import Targets
+from tests.builders.traffic_by_hand import make_trajectories
 from tests.oracles.full_scan import beam_directions
 
 FLAT = np.array([[[-99, -99, 0], [99, -99, 0], [99, 99, 0]], [[-99, -99, 0], [99, 99, 0], [-99, 99, 0]]], dtype=float)
@@ -31,19 +31,7 @@ def targets(*places):
 
 
 def car_at(x, y, yaw=0.0, until=10.0):
-    car = RoadUser("car", "car", 4.0, 2.0, 1.5)
-    time = np.array([0.0, until])
-    return Trajectories(
-        users=(car,),
-        first=np.array([0, 2]),
-        time=time,
-        position=np.array([[x, y, 0.0]] * 2),
-        yaw=np.full(2, yaw),
-        pitch=np.zeros(2),
-        speed=np.zeros(2),
-        origin=np.zeros(3),
-        source="by hand",
-    )
+    return make_trajectories([(0.0, x, y, 0.0, yaw, 0.0), (until, x, y, 0.0, yaw, 0.0)])
 
 
 def surface(triangles):

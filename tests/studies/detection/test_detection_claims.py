@@ -1,6 +1,14 @@
 """Each claim's verdict, both ways and open, on trials that are told and not run."""
 
-from headless.studies.detection.claims import SeedResult, detection_claims
+from headless.studies.detection import price_chart
+from headless.studies.detection.claims import SeedResult, detection_claims, mean_interval
+from headless.studies.detection.price_chart import PrecisionCell, save_price_chart
+
+import numpy as np
+import pytest
+
+from seip_addon.core.output.pictures import chart_style as style
+from tests.builders.charts import is_drawn, line, record_figures
 
 PRICE = {"type1": 6000.0, "type2": 15000.0, "type3": 80000.0}
 PUBLISHED = {"type1": (0.60, 0.80, 0.87), "type2": (0.75, 0.85, 0.90), "type3": (0.90, 0.91, 0.91)}
@@ -52,3 +60,46 @@ def test_seeds_that_disagree_decide_nothing():
 def test_the_simplest_type_has_to_gain_more_than_every_other():
     assert verdicts(PUBLISHED | {"type3": (0.50, 0.80, 0.92)})[7] == "does not hold"
     assert verdicts(PUBLISHED | {"type3": (0.63, 0.80, 0.90)})[7] == "undecided"
+
+
+def test_mean_interval_of_three_seeds_by_hand():
+    """Mean 0.7, standard deviation 0.1, t = 4.303: ± 4.303 · 0.1/√3 = 0.248."""
+    assert mean_interval([0.6, 0.7, 0.8]) == pytest.approx((0.7 - 0.24841, 0.7 + 0.24841), abs=1e-5)
+
+
+def test_three_seeds_are_covered_nineteen_times_of_twenty():
+    rng = np.random.default_rng(1)
+    intervals = np.array([mean_interval(values) for values in rng.normal(0.5, 0.1, (2000, 3))])
+    assert ((intervals[:, 0] <= 0.5) & (intervals[:, 1] >= 0.5)).mean() == pytest.approx(0.95, abs=0.015)
+
+
+CELLS = (
+    PrecisionCell("type1", 1, 6_000, 0.2, (0.55, 0.57, 0.59), (0.52, 0.62)),
+    PrecisionCell("type1", 2, 12_000, 0.3, (0.70, 0.72, 0.74), (0.67, 0.77)),
+    PrecisionCell("type2", 1, 15_000, 0.4, (0.65, 0.66, 0.67), None),
+    PrecisionCell("type2", 2, 30_000, 0.6, (0.80, 0.80, 0.80), (0.80, 0.80)),
+)
+
+
+@pytest.fixture
+def figures(monkeypatch):
+    """The figures that were saved."""
+    return record_figures(monkeypatch, price_chart, style)
+
+
+def test_price_chart_has_its_front_and_names(tmp_path, figures):
+    save_price_chart(tmp_path / "price.png", CELLS, "Junction")
+    assert is_drawn(tmp_path / "price.png")
+    (panel,) = figures[0].axes
+    front = line(panel, "front: nothing cheaper detects as well")
+    assert front.get_xdata().tolist() == [6_000, 12_000, 30_000]
+    assert front.get_ydata() == pytest.approx([0.57, 0.72, 0.80])
+    assert {text.get_text() for text in panel.texts} == {"1 × type1", "2 × type1", "1 × type2", "2 × type2"}
+    boxes = [text.get_window_extent() for text in panel.texts]
+    assert not any(a.overlaps(b) for row, a in enumerate(boxes) for b in boxes[:row])
+
+
+def test_the_same_chart_has_the_same_bytes(tmp_path):
+    for name in ("a.png", "b.png"):
+        save_price_chart(tmp_path / name, CELLS, "Junction")
+    assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()

@@ -1,13 +1,19 @@
 """The command from a scene and its traffic to what each placement detects."""
 
 import csv
+import math
 
 import pytest
 
+from tests.builders.labelled_frames import near_and_far
+
 pytest.importorskip("torch", reason="torch is not installed: make detection")
 
+from headless.detection.average_precision import evaluate
+from headless.detection.matching import Rule
 from headless.detection.rules import RULES
-from headless.studies.detection import command as evaluate
+from headless.studies.detection import command
+from headless.studies.detection.case_study import false_positives
 
 from matplotlib.image import imread
 
@@ -24,7 +30,7 @@ def runs(small_scene):
 def run(small_scene, runs):
     def run(folder, *options, runs=runs):
         traffic = ["--traffic", *map(str, runs)]
-        evaluate.main([str(small_scene), "-o", str(folder), *COARSE, *BRIEF, *traffic, *options])
+        command.main([str(small_scene), "-o", str(folder), *COARSE, *BRIEF, *traffic, *options])
 
     return run
 
@@ -65,3 +71,16 @@ def test_an_evaluation_goes_on_and_ends_the_same(run, folder, tmp_path, capsys):
     assert "bev_0.7_moving" in said
     for path in folder.iterdir():
         assert path.read_bytes() == (tmp_path / path.name).read_bytes(), path.name
+
+
+AT_07 = Rule()
+
+
+def test_false_positives_and_how_many_are_in_sparse_places():
+    """Around half of the hits the density is under 30: both false ones are in sparser places."""
+    evaluation = evaluate([near_and_far()], AT_07)
+    assert false_positives(evaluation, 0.1) == (2, 1)
+    # From 0.9 on there is one hit with density 40, and nothing is false.
+    per_frame, sparse = false_positives(evaluation, 0.9)
+    assert per_frame == 0
+    assert math.isnan(sparse)

@@ -1,11 +1,23 @@
 """The page on the paper's case, from figures that are told and not measured."""
 
+import re
 from dataclasses import dataclass
 from itertools import product
+from pathlib import Path
 
 from headless.studies.claims import FAILS, HOLDS, UNDECIDED, Claim
 from headless.studies.coverage.cells import CHARTED_WEIGHT, COUNTS, Case, CoverageStudy, EmptyCell
 from headless.studies.paper.page import PUBLISHED_CLAIMS, PlacementFigures, page
+
+import pytest
+
+pytest.importorskip("torch", reason="torch is not installed: make detection")
+from headless.studies.paper import command as paper_case
+
+from matplotlib.image import imread
+
+from seip_addon.core.base.errors import SeipError
+from tests.sumo_here import needs_sumo
 
 TYPES, HEIGHTS, TARGETS = ("type1", "type2", "type3"), (3.5, 5.4, 8.0), 1000
 FACTS = {"scene": "the map", "criterion": "δ = 1 m", "traffic": "only SUMO", "training": "60 steps"}
@@ -87,3 +99,48 @@ def test_figures_stand_beside_those_of_the_paper():
         "| Traffic | SUMO and CARLA together; length, runs and split into training and test are not given | only"
         in text
     )
+
+
+MAP = Path(__file__).resolve().parents[3] / "scenes" / "junction.xodr"
+
+
+@pytest.fixture
+def run(tmp_path):
+    def run(*options, junction="100", source=MAP):
+        folders = ["--work", str(tmp_path / "work"), "-o", str(tmp_path / "docs")]
+        paper_case.main([str(source), "--junction", junction, *folders, *options])
+
+    return run
+
+
+@needs_sumo
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"junction": "965"}, r"no junction '965' in map"),
+        ({"source": MAP.with_name("none.xodr")}, r"there is no file .*none.xodr: check its path"),
+    ],
+)
+def test_files_that_do_not_fit_are_one_sentence(run, tmp_path, changes, message):
+    with pytest.raises(SeipError, match=message):
+        run(**changes)
+    assert not (tmp_path / "docs" / "paper.md").exists()
+    assert not list(tmp_path.glob("work/*traffic*/*"))
+
+
+@needs_sumo
+@pytest.mark.slow
+def test_the_page_is_written_with_its_charts(run, tmp_path, capsys):
+    brief = ["--runs", "4", "--duration", "12", "--every", "9", "--steps", "1", "--trainings", "1"]
+    few = ["--approaches", "20", "--effort", "2"]
+    run(*brief, *few)
+    text = (tmp_path / "docs" / "paper.md").read_text(encoding="utf-8")
+    assert "--steps 1 --trainings 1 --every 9" in text
+    assert str(tmp_path) not in text
+    assert "validation AP was still rising" in text
+    pictures = re.findall(r"!\[.*?\]\((.*?)\)", text)
+    assert len(pictures) == 1
+    assert all(imread(tmp_path / "docs" / picture).shape[1] > 600 for picture in pictures)
+    said = capsys.readouterr().out
+    assert "claim 8 (" in said
+    assert "undecided" in text

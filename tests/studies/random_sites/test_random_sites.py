@@ -1,10 +1,13 @@
 import math
 from itertools import combinations
+from xml.etree import ElementTree as ET
 
 from headless.studies.random_sites import command as generate_sites
+from headless.studies.random_sites.demand_draw import DrawnDemand
 from headless.studies.random_sites.extract_text import LATITUDE, LONGITUDE, write_extract, write_terrain
 from headless.studies.random_sites.production import run_path
 from headless.studies.random_sites.street_plan import MIN_ANGLES, draw_plan
+from headless.studies.random_sites.varied_bodies import KINDS, draw_size
 
 import numpy as np
 import pytest
@@ -12,9 +15,12 @@ import shapely
 
 from seip_addon.core.base.progress import finish
 from seip_addon.core.sensing.traffic.run_overlap import MAX_OVERLAP, overlap_of, vehicle_positions
-from seip_addon.core.sensing.traffic.trajectories import Trajectories
+from seip_addon.core.sensing.traffic.trajectories import CATEGORIES, Trajectories
+from seip_addon.core.sensing.traffic.vehicle_types import read_vehicle_types
 from seip_addon.core.world.elevation.geotiff import read_geotiff
 from seip_addon.core.world.openstreetmap.extract import read_extract
+from seip_addon.core.world.traffic_simulation.demand import Demand, write_routes
+from tests.builders.street_network import three_ways
 from tests.sumo_here import needs_sumo
 
 PLANS = [draw_plan(np.random.default_rng([5, number])) for number in range(40)]
@@ -101,3 +107,45 @@ def test_a_site_is_made_kept_and_made_again(tmp_path, capsys):
     run_path(one, 2).unlink()
     generate_sites.main(["-o", str(tmp_path / "one"), *arguments])
     assert run_path(one, 2).read_bytes() == run_path(other, 2).read_bytes()
+
+
+@pytest.mark.parametrize("category", CATEGORIES)
+def test_means_and_spreads_are_those_of_the_table(category):
+    random = np.random.default_rng(3)
+    found = np.array([draw_size(category, random) for _ in range(3000)])
+    kinds = list(KINDS[category].values())
+    assert sum(kind.share for kind in kinds) == pytest.approx(1.0)
+    shares = np.array([kind.share for kind in kinds])
+    rows = np.array([(kind.length, kind.width, kind.height) for kind in kinds])
+    mean = shares @ rows[..., 0]
+    cut = 0.85  # a standard deviation of normal values within two of them is 0.88, of three that all are, less
+    spread = np.sqrt(shares @ (rows[..., 0] ** 2 + (cut * rows[..., 1]) ** 2) - mean**2)
+    assert found.mean(axis=0) == pytest.approx(mean, abs=4 * spread.max() / np.sqrt(len(found)))
+    assert found.std(axis=0) == pytest.approx(spread, rel=0.08)
+    low, high = (rows[..., 0] + 2 * sign * rows[..., 1] for sign in (-1, 1))
+    assert (found >= low.min(axis=0) - 0.006).all()
+    assert (found <= high.max(axis=0) + 0.006).all()
+
+
+def routes(folder, demand):
+    path = folder / "r.rou.xml"
+    write_routes(path, three_ways(folder), demand, seed=1, duration=3600.0)
+    return ET.parse(path).getroot(), path.read_bytes()  # noqa: S314  # written just now
+
+
+def test_own_sizes_are_drawn_for_each_road_user(tmp_path):
+    root, text = routes(tmp_path, DrawnDemand(flow=1500.0))
+    types = finish(read_vehicle_types([tmp_path / "r.rou.xml"]))
+    moving = [entry for entry in root if entry.tag in ("vehicle", "person")]
+    assert all(entry.get("type") == entry.get("id") for entry in moving)
+    for entry in moving:
+        category, own = entry.get("id").partition("-")[0], types[entry.get("id")]
+        assert own.category in ({"car", "van"} if category == "parked" else {category})
+        assert category != "parked" or own.length <= 6.0
+    cars = [types[entry.get("id")] for entry in moving if entry.get("id").startswith("car")]
+    assert len({(car.length, car.width, car.height) for car in cars}) > 0.9 * len(cars) > 50
+    assert all(3.6 <= car.length <= 5.2 for car in cars)
+    assert text == routes(tmp_path, DrawnDemand(flow=1500.0))[1]
+    _, plain = routes(tmp_path, Demand(flow=1500.0))
+    drives = [line.partition('depart="')[2] for line in plain.decode().splitlines() if "<vehicle " in line]
+    assert drives == [line.partition('depart="')[2] for line in text.decode().splitlines() if "<vehicle " in line]

@@ -2,8 +2,10 @@
 
 import math
 from dataclasses import replace
+from pathlib import Path
 
 from headless.detection.detection_area import area_of
+from headless.studies.site_training.companions import with_companions
 from headless.studies.site_training.field_conditions import (
     ANGLE_ERROR,
     GROUND_ERROR,
@@ -17,13 +19,51 @@ from headless.studies.site_training.field_conditions import (
 
 import numpy as np
 import pytest
+import shapely
 
 from seip_addon.core.base.progress import finish
+from seip_addon.core.sensing.lidar.carla_dropoff import CarlaDropoff
+from seip_addon.core.sensing.lidar.catalogue import load_catalogue
 from seip_addon.core.sensing.scans.frame import STATIC_INSTANCE
+from seip_addon.core.sensing.scans.sensor import MountedSensor, level_orientation
 from seip_addon.core.sensing.scans.simulation import ScanSettings, prepare
 from seip_addon.core.sensing.scans.static_scene import static_scene
 from seip_addon.core.sensing.traffic.bodies import fitted_body
-from tests.builders.square_by_hand import road, sensors
+from seip_addon.core.sensing.traffic.overlaps import find_overlaps
+from seip_addon.core.sensing.traffic.trajectories import RoadUser, Trajectories
+from seip_addon.core.site.scene_geometry import Mesh, SceneGeometry
+
+
+def road():
+    """A level square of 80 m, a car and a van that drive east, one behind the other, and four parked cars."""
+    corners = np.array([[-40.0, -40, 0], [40, -40, 0], [40, 40, 0], [-40, 40, 0]])
+    triangles = corners[[[0, 1, 2], [0, 2, 3]]]
+    surface = Mesh("road", triangles, np.full(2, 0.3))
+    geometry = SceneGeometry("Square", np.zeros(3), (surface,), (), (), shapely.box(-30, -30, 30, 30))
+    parked = tuple(RoadUser(f"parked {number}", "car", 4.5, 1.8, 1.5) for number in range(4))
+    users = (RoadUser("one", "car", 4.5, 1.8, 1.5), RoadUser("other", "van", 5.5, 2.0, 2.2), *parked)
+    driving = [[-20.0, 2, 0], [20, 2, 0], [-30, 2, 0], [10, 2, 0]]
+    standing = [[x, -10.0, 0] for x in (-24, -12, 0, 12) for _ in range(2)]
+    trajectories = Trajectories(
+        users=users,
+        origin=np.zeros(3),
+        first=np.arange(0, 13, 2),
+        time=np.tile([0.0, 4.0], 6),
+        position=np.array(driving + standing),
+        yaw=np.zeros(12),
+        pitch=np.zeros(12),
+        speed=np.repeat([10.0, 0.0], [4, 8]),
+    )
+    return geometry, trajectories
+
+
+def sensors():
+    model = replace(load_catalogue()["type1"], law=CarlaDropoff(general=0.1))
+    return tuple(
+        MountedSensor(f"S{number}", model, np.array(place), level_orientation(0.3 * number))
+        for number, place in enumerate([(-8.0, -6.0, 5.0), (12.0, 9.0, 6.0)])
+    )
+
 
 SEEDS = range(12)
 
@@ -108,3 +148,34 @@ def test_labels_count_the_points_that_are_left():
         for user, counted in zip(after.labels.user, after.labels.points, strict=True):
             own = after.sensor[after.instance == user]
             assert counted.tolist() == np.bincount(own, minlength=len(sensors())).tolist()
+
+
+RUN = Path(__file__).parents[3] / "scenes" / "junction_traffic_dense" / "run-21.npz"
+
+
+@pytest.fixture(scope="module")
+def alone():
+    return Trajectories.load(RUN)
+
+
+@pytest.fixture(scope="module")
+def grouped(alone):
+    return finish(with_companions(alone, 3))
+
+
+def test_companions_keep_near_the_one_they_walk_with(alone, grouped):
+    names = {user.name: number for number, user in enumerate(alone.users)}
+    for number in range(len(alone), len(grouped)):
+        leader = names[grouped.users[number].name.rsplit(" companion ", 1)[0]]
+        own = slice(*grouped.first[number : number + 2])
+        theirs = slice(*grouped.first[leader : leader + 2])
+        np.testing.assert_array_equal(grouped.time[own], grouped.time[theirs])
+        apart = np.linalg.norm(grouped.position[own] - grouped.position[theirs], axis=1)
+        assert apart.min() > 0.5
+        assert apart.max() < 2.1
+        assert np.ptp(apart) < 1e-6
+
+
+def test_no_companion_overlaps_anyone(alone, grouped):
+    before = {tuple(pair) for pair in finish(find_overlaps(alone)).pair.tolist()}
+    assert {tuple(pair) for pair in finish(find_overlaps(grouped)).pair.tolist()} <= before

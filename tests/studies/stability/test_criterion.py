@@ -6,12 +6,14 @@ from pathlib import Path
 from unittest.mock import patch
 
 from headless.studies.stability import charts
+from headless.studies.stability import command as stability
 from headless.studies.stability.criterion import criterion_rows, criterion_study, deviation, in_view, rotated_targets
 
 import numpy as np
 import pytest
 
 from seip_addon.core.base.progress import finish
+from seip_addon.core.choosing.placement.scenarios import Scenarios
 from seip_addon.core.sensing.lidar.catalogue import load_catalogue
 from seip_addon.core.sensing.visibility.ray_casting import make_ray_caster
 from seip_addon.core.sensing.visibility.ring_resolution import unresolved_from
@@ -85,3 +87,32 @@ def test_the_study_finds_the_border_of_the_rings(tmp_path: Path) -> None:
     charts.save_convergence_chart(tmp_path / "convergence.png", study, "convergence")
     for chart in tmp_path.iterdir():
         assert chart.read_bytes().startswith(b"\x89PNG")
+
+
+SCENE = Path(__file__).resolve().parents[3] / "scenes" / "junction.blend"
+COARSE = ["--sensor", "type1", "--heights", "5.4", "--grid", "8", "--spacing", "25", "--effort", "2"]
+LITTLE = stability.StabilityScope(
+    grids=8,
+    draws=(20, 5),
+    robust=Scenarios("pose-errors", count=3, held_out=20),
+    traffic=Scenarios("traffic", count=2, held_out=12),
+)
+
+
+def test_the_page_has_all_chapters_and_charts(tmp_path):
+    with patch.multiple(
+        "headless.studies.stability.criterion",
+        DELTAS=(4.0, 6.0),
+        GRID_SPACINGS=(8.0, 6.0),
+        CANDIDATE_SPACINGS=(30.0, 25.0),
+        EVALUATION_SPACING=4.0,
+    ):
+        stability.main([str(SCENE), "-o", str(tmp_path), "--work", str(tmp_path / "work"), *COARSE], LITTLE)
+    page = (tmp_path / "stability.md").read_text(encoding="utf-8")
+    titles = [line[3:].partition(":")[0] for line in page.splitlines() if line.startswith("## ")]
+    assert titles == ["The criterion of visibility", "Pose errors", "Failures", "Occlusion by traffic"]
+    named = {part.split(")")[0] for part in page.split("](stability/")[1:]}
+    assert named == {path.name for path in (tmp_path / "stability").iterdir()}
+    rows = [line for line in page.splitlines() if line.startswith("| ") and "---" not in line]
+    assert len(rows) == 4 + 5 + 6 + 2 + 2
+    assert all(line.count(" | ") == 4 for line in rows)
