@@ -8,7 +8,6 @@ from headless import place
 import numpy as np
 import pytest
 
-from seip_addon.core.base.errors import SeipError
 from seip_addon.core.choosing.placement.scenarios import DEFAULT_COUNTS
 from seip_addon.core.output.results.file_names import TRAFFIC_PICTURES
 from seip_addon.core.sensing.traffic.trajectories import RoadUser, Trajectories
@@ -54,18 +53,3 @@ def test_it_writes_a_result_and_says_what_traffic_hides(tmp_path, capsys, run):
     assert "chosen for the empty road: " in said
     assert "vehicles of one run within 1 m of one of another at the same instant: " in said
     assert any(note.startswith("this placement sees ") and note in said for note in notes)
-
-
-def test_traffic_that_is_of_no_use_is_refused(tmp_path, run):
-    here = trajectories(tmp_path / "here.npz")
-    with pytest.raises(SeipError, match="two runs of traffic or more are needed, not 1"):
-        run(tmp_path / "out", "--traffic", here)
-    with pytest.raises(SeipError, match=r"here.npz is named twice"):
-        run(tmp_path / "out", "--traffic", here, here)
-    assert not (tmp_path / "out" / "visibility.npz").exists()  # refused before any ray is cast
-    with pytest.raises(SeipError, match="traffic of another place"):
-        run(tmp_path / "out", "--traffic", here, trajectories(tmp_path / "there.npz", x=9000.0))
-    with pytest.raises(SeipError, match="simulate more traffic"):
-        run(tmp_path / "out", "--traffic", here, trajectories(tmp_path / "short.npz", x=5.0, end=1.0))
-    with pytest.raises(SeipError, match=r"here.npz and .*again.npz are nearly the same traffic"):
-        run(tmp_path / "out", "--traffic", here, trajectories(tmp_path / "again.npz", x=0.5))

@@ -2,7 +2,6 @@
 
 import json
 import math
-import os
 import subprocess
 import sys
 from pathlib import Path
@@ -16,10 +15,8 @@ import pytest
 from seip_addon.core.base.errors import SeipError
 from seip_addon.core.sensing.scans.run_folder import load_frames
 from seip_addon.core.sensing.traffic.trajectories import RoadUser, Trajectories
-from seip_addon.core.storage.files import lock_folder
 from seip_addon.scene import contract
 from seip_addon.scene.blend_file import save_blend
-from seip_addon.scene.traffic import animate
 from seip_addon.scene.write import write_result
 from tests.builders.scene_by_hand import make_scene
 from tests.builders.small_junction import ORIGIN, make_example
@@ -111,26 +108,6 @@ def test_the_same_run_in_another_process_is_the_same_bytes(folder, run):
         assert one[name] == other[name], name
 
 
-@pytest.mark.slow
-def test_a_started_run_is_finished(folder, run):
-    frame = folder / "run" / "frames" / "000001.npz"
-    before = contents(run)
-    frame.unlink()
-    simulate.main([*arguments(folder, "run"), "--format", "pcd", "--split", "val"])
-    assert contents(run) == before
-
-
-@pytest.mark.slow
-def test_traffic_that_is_animated_in_the_scene_is_simulated(folder):
-    bpy.ops.wm.open_mainfile(filepath=str(folder / "placed.blend"))
-    animate(bpy.context.scene, make_traffic().moved_to(ORIGIN))
-    save_blend(folder / "animated.blend")
-    simulate.main([str(folder / "animated.blend"), "-o", str(folder / "animated"), *QUICK])
-    frames = [frame for _, frame in load_frames(folder / "animated")]
-    moved = [frame.labels.centre[frame.labels.category == "car"][0, 0] for frame in frames]
-    assert np.diff(moved) == pytest.approx([2.0, 2.0], abs=0.01)
-
-
 @pytest.mark.parametrize(
     ("change", "words"),
     [
@@ -145,13 +122,6 @@ def test_each_mistake_has_its_sentence(folder, change, words):
         simulate.main(arguments(folder, "wrong", *change))
 
 
-def test_a_folder_of_another_run_is_left_alone(folder, run):
-    before = contents(run)
-    with pytest.raises(SeipError, match="different scene, traffic or settings"):
-        simulate.main(arguments(folder, "run", "--seed", "1"))
-    assert contents(run) == before
-
-
 def test_a_scene_without_sensors_or_traffic_has_its_sentence(folder):
     bpy.ops.wm.open_mainfile(filepath=str(folder / "placed.blend"))
     for obj in list(contract.find(bpy.context.scene, contract.SENSORS).objects):
@@ -163,11 +133,3 @@ def test_a_scene_without_sensors_or_traffic_has_its_sentence(folder):
         )
     with pytest.raises(SeipError, match="no traffic"):
         simulate.main([str(folder / "placed.blend"), "-o", str(folder / "wrong")])
-
-
-def test_two_runs_into_one_folder_have_a_sentence(folder):
-    (folder / "shared").mkdir()
-    held = lock_folder(folder / "shared")
-    with pytest.raises(SeipError, match=f"another run is writing to {folder / 'shared'}: wait until it has ended"):
-        simulate.main(arguments(folder, "shared"))
-    os.close(held)

@@ -7,18 +7,7 @@ import pytest
 
 from seip_addon.core.base.progress import finish
 from seip_addon.core.sensing.visibility.settings import VisibilitySettings
-from seip_addon.core.sensing.visibility.visibility_model import visibility_model
 from seip_addon.core.workflows.survey import grid_key, lay_out, see
-
-
-def test_the_grid_is_that_of_each_pose_alone(small_survey):
-    site = small_survey.site
-    one_by_one = visibility_model(site, small_survey.settings.visibility)
-    seen = small_survey.grid.visible
-    for pose in range(0, len(site.candidates), 7):
-        model = small_survey.models[str(site.candidates.sensor[pose])]
-        alone, _ = one_by_one.scan_upright(model, site.candidates.xyz[pose], float(site.candidates.yaw[pose]))
-        np.testing.assert_array_equal(seen[pose], alone)
 
 
 def test_a_stored_grid_is_read_and_not_computed_again(small_survey, small_layout, monkeypatch):

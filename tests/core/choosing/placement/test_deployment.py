@@ -4,12 +4,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from seip_addon.core.choosing.placement.deployment import deploy
-from tests.builders.small_junction import Example, make_example
-
-
-@pytest.fixture(scope="module")
-def example() -> Example:
-    return make_example()
 
 
 def seen_by_hand(example, chosen):

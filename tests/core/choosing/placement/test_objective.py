@@ -7,12 +7,6 @@ from seip_addon.core.base.errors import SeipError
 from seip_addon.core.base.progress import finish
 from seip_addon.core.choosing.placement.objective import Objective, check_objective, placement_problem, target_weights
 from seip_addon.core.workflows.placing import optimise
-from tests.builders.small_junction import make_example
-
-
-@pytest.fixture(scope="module")
-def example():
-    return make_example()
 
 
 def problem(example, **goal):

@@ -11,14 +11,8 @@ from seip_addon.core.sensing.lidar.catalogue import load_catalogue
 from seip_addon.core.sensing.visibility.settings import VisibilitySettings
 from seip_addon.core.sensing.visibility.surroundings import Surroundings
 from seip_addon.core.sensing.visibility.visibility_model import visibility_model
-from tests.builders.small_junction import make_example
 
 CATALOGUE = load_catalogue()
-
-
-@pytest.fixture(scope="module")
-def example():
-    return make_example()
 
 
 def deployed(example, key):

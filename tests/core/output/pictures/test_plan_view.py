@@ -12,12 +12,6 @@ from seip_addon.core.choosing.placement.deployment import deploy
 from seip_addon.core.output.pictures.palette import SEEN_COLOURS
 from seip_addon.core.output.pictures.plan_view import draw_plan
 from seip_addon.core.site.scene_geometry import ASSUMED, Mesh, Pole
-from tests.builders.small_junction import make_example
-
-
-@pytest.fixture(scope="module")
-def example():
-    return make_example()
 
 
 def pixel_at(figure, xy):

@@ -3,12 +3,6 @@ import csv
 import pytest
 
 from seip_addon.core.output.results.candidate_table import save_candidate_table
-from tests.builders.small_junction import make_example
-
-
-@pytest.fixture(scope="module")
-def example():
-    return make_example()
 
 
 @pytest.fixture(scope="module")

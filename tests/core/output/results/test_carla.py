@@ -7,12 +7,6 @@ import pytest
 from seip_addon.core.geometry.orientation import orientations
 from seip_addon.core.output.results.carla import carla_spawns
 from seip_addon.core.sensing.lidar.catalogue import load_catalogue
-from tests.builders.small_junction import make_example
-
-
-@pytest.fixture(scope="module")
-def example():
-    return make_example()
 
 
 def test_location_is_the_map_position_with_y_negated(example):

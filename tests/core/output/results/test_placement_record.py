@@ -24,7 +24,7 @@ from seip_addon.core.output.results.placement_record import (
 from seip_addon.core.output.results.versions import versions
 from seip_addon.core.site.scene_geometry import HEIGHTS_FROM
 from seip_addon.core.site.sources import SourceCount
-from tests.builders.small_junction import Example, make_example
+from tests.builders.small_junction import Example
 from tests.oracles.json_schema import violations
 from tests.oracles.placement_schema import FILE, text
 
@@ -35,11 +35,6 @@ SCHEMA = json.loads(FILE.read_text(encoding="utf-8"))
 def solution(chosen, **values) -> Placement:
     more = {"status": "feasible", "solver": "HiGHS", "price": 0.0}
     return Placement(chosen=np.array(chosen), notes=("3 suffice",), **{**more, **values})
-
-
-@pytest.fixture(scope="module")
-def example() -> Example:
-    return make_example()
 
 
 @pytest.fixture
