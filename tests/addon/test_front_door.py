@@ -21,10 +21,8 @@ from seip_addon.scene.sensors import placed_sensors
 from seip_addon.scene.views import CLIP_END
 from seip_addon.scene.write import write_result
 from tests.builders.drawn_layout import DrawnLayout
-from tests.builders.osm_text import crossing
 from tests.builders.scene_by_hand import make_scene
 from tests.builders.small_junction import make_example
-from tests.sumo_here import needs_sumo
 
 SCENES = Path(__file__).resolve().parents[2] / "scenes"
 
@@ -34,11 +32,6 @@ def fresh(add_on):
     """Blender as it starts, with cube, light and camera."""
     bpy.ops.wm.read_homefile(use_factory_startup=True)
     return bpy.context.scene
-
-
-@pytest.fixture
-def extract(tmp_path):
-    return crossing().write(tmp_path / "place.osm")
 
 
 def views():
@@ -59,19 +52,6 @@ def test_import_is_in_the_file_menu_and_takes_dropped_files(scene):
     for kind, expected in (("VIEW_3D", True), ("TEXT_EDITOR", False)):
         area = SimpleNamespace(area=SimpleNamespace(type=kind))
         assert handler.poll_drop(area) == expected
-
-
-@needs_sumo
-def test_a_site_of_an_extract_is_built_with_its_map(scene, extract):
-    bpy.ops.seip.choose_map(filepath=str(extract))
-    site = scene.seip.site
-    site.radius, site.position = 40.0, "52.5, 13.4"
-    assert bpy.ops.seip.build_site() == {"FINISHED"}
-    assert read_scene(scene).geometry.region.area > 400
-    assert len(contract.find(scene, contract.OCCLUDERS).objects) >= 4
-    (text,) = bpy.data.texts
-    assert text.name.endswith(".net.xml")
-    assert "<net " in text.as_string()
 
 
 def test_the_example_is_the_shipped_junction_without_the_start_up_cube_and_the_view_shows_it_all(fresh):

@@ -34,25 +34,6 @@ def coarse(junction):
         yield junction
 
 
-@pytest.mark.slow
-def test_panel_and_batch_place_alike_and_what_it_was_chosen_on_stays_with_it(coarse, tmp_path, small_scene):
-    goal = coarse.seip.goal
-    goal.failures = "worst"  # left from other scenarios, and not shown for these
-    assert bpy.ops.seip.solve_placement() == {"FINISHED"}
-    certificate, purpose, band = session.of(coarse).state.solution.caption
-    assert band.startswith("over plausible gains")
-    assert certificate.endswith("among these candidates to see the road in traffic, on average over 2 instants.")
-    assert (certificate[:6], purpose[:17]) == ("Proven", "chosen to see the")
-    path = tmp_path / "placed.blend"
-    bpy.ops.wm.save_as_mainfile(filepath=str(path))
-    bpy.ops.wm.open_mainfile(filepath=str(path))
-    seip = bpy.context.scene.seip
-    panel = parsed_record(seip.result.record)
-    assert any(note.startswith("this placement sees ") for note in panel.notes)
-    place.main([str(small_scene), *OPTIONS, "-o", str(tmp_path)])
-    assert comparable(panel) == comparable(load_placement(tmp_path / "placement.json"))
-
-
 def test_evaluate_only_states_what_traffic_leaves_of_the_placement_for_the_empty_road(coarse, tmp_path, small_scene):
     coarse.seip.goal.scenarios = "nominal"
     assert bpy.ops.seip.solve_placement() == {"FINISHED"}

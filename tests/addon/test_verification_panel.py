@@ -1,13 +1,9 @@
 """Verification from the panel: what it finds in a simulated recording, writes, and adds to the scene."""
 
-from __future__ import annotations
-
 import json
 import re
 import shutil
-from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 
 import bpy
 import numpy as np
@@ -17,12 +13,10 @@ from seip_addon.core.base.progress import finish
 from seip_addon.core.output.datasets.formats import POINT_TYPE, encode
 from seip_addon.core.output.results.verification_record import load_verification
 from seip_addon.core.sensing.lidar.catalogue import load_catalogue
-from seip_addon.core.sensing.scans.sensor import MountedSensor
 from seip_addon.core.sensing.scans.simulation import ScanSettings, prepare
 from seip_addon.core.sensing.scans.static_scene import static_scene
 from seip_addon.core.sensing.traffic.bodies import fitted_body
-from seip_addon.core.sensing.traffic.trajectories import Trajectories
-from seip_addon.core.site.scene_geometry import Mesh, SceneGeometry
+from seip_addon.core.site.scene_geometry import Mesh
 from seip_addon.core.workflows.verifying import verify
 from seip_addon.panel import verification as panel
 from seip_addon.panel.session import session
@@ -38,14 +32,14 @@ EVERY = 1.2  # seconds between sweeps
 
 
 def save_site_recording(
-    folder: Path,
-    geometry: SceneGeometry,
-    sensors: Sequence[MountedSensor],
-    traffic: Trajectories,
+    folder,
+    geometry,
+    sensors,
+    traffic,
     *,
-    sweeps: int = 20,
-    seed: int = 0,
-) -> Path:
+    sweeps=20,
+    seed=0,
+):
     """Write sweeps of sensors in their own axes, a folder of PCD files for each; traffic is in local axes."""
     bodies = [fitted_body(user) for user in traffic.users]
     static = static_scene(geometry, sensors)
@@ -64,7 +58,7 @@ def save_site_recording(
     return folder
 
 
-def changed(geometry: SceneGeometry, gone: str, new: Sequence[Mesh]) -> SceneGeometry:
+def changed(geometry, gone, new):
     """Return a site without one of its occluders and with others."""
     others = tuple(mesh for mesh in geometry.occluders if mesh.name != gone)
     assert len(others) == len(geometry.occluders) - 1

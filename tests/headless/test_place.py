@@ -19,7 +19,6 @@ import pytest
 
 from seip_addon.core.base.errors import SeipError
 from seip_addon.core.choosing.placement.objective import ACCEPTED_MESSAGE
-from seip_addon.core.choosing.placement.scenarios import Scenarios
 from seip_addon.core.output.results.placement_record import comparable, load_placement
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -56,13 +55,6 @@ def test_the_folder_holds_every_result(folder):
         "sensors.png",
         "placed.blend",
     }
-
-
-def test_the_record_says_how_far_it_can_be_trusted(folder):
-    record = load_placement(folder / "placement.json")
-    assert record.request.goal.scenarios == Scenarios()
-    assert not any("in one of twenty cases" in note for note in record.notes)
-    assert any("neighbouring rings" in warning for warning in record.warnings)
 
 
 def test_the_next_placement_keeps_the_positions_of_the_installed_sensors(folder, tmp_path):
@@ -199,11 +191,6 @@ def test_each_mistake_has_its_sentence_and_leaves_no_result(options, sentence, t
     before_any_ray = sentence != "cannot be reached"
     assert (tmp_path / "visibility.npz").exists() is not before_any_ray
     assert all(not path.name.startswith(".") for path in tmp_path.iterdir())
-
-
-def test_a_missing_scene_is_named(tmp_path):
-    with pytest.raises(SeipError, match=r"there is no file nowhere\.blend"):
-        place.main(["nowhere.blend", "-o", str(tmp_path)])
 
 
 def test_a_folder_that_cannot_be_written_is_refused_before_the_work(tmp_path, run):

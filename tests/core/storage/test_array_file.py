@@ -1,7 +1,5 @@
 """Files of arrays: the program's own in their format and version, and npz files of other programs within limits."""
 
-from __future__ import annotations
-
 import gzip
 import io
 import resource

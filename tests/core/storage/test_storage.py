@@ -1,7 +1,5 @@
 """One run at a time in a folder, and nothing left there by runs that ended otherwise than they should."""
 
-from __future__ import annotations
-
 import csv
 import os
 import signal

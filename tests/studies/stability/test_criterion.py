@@ -1,7 +1,5 @@
 """The study of the criterion, on a small junction."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from unittest.mock import patch
 
@@ -28,7 +26,7 @@ GEOMETRY = make_geometry(24.0)
 
 
 @needs_any
-def test_lines_of_sight() -> None:
+def test_lines_of_sight():
     road = rectangle((-50, -5), (50, 5), step=10.0)
     wall = np.array([[[10.0, -5, 0], [10, 5, 0], [10, 5, 20]], [[10, -5, 0], [10, 5, 20], [10, -5, 20]]])
     model = load_catalogue()["type3"]
@@ -41,7 +39,7 @@ def test_lines_of_sight() -> None:
     assert not seen[4]  # out of range
 
 
-def test_turned_grids_cover_the_same_road() -> None:
+def test_turned_grids_cover_the_same_road():
     plain = rotated_targets(GEOMETRY, 1.0, np.zeros(2), 0.0)
     turned = rotated_targets(GEOMETRY, 1.0, np.array([0.3, 0.8]), 0.6)
     assert len(turned) == pytest.approx(GEOMETRY.region.area, rel=0.02)
@@ -50,7 +48,7 @@ def test_turned_grids_cover_the_same_road() -> None:
     assert gaps[gaps > 0].min() == pytest.approx(1.0)
 
 
-def test_intervals_contain_the_true_deviation() -> None:
+def test_intervals_contain_the_true_deviation():
     random = np.random.default_rng(0)
     held = 0
     for _ in range(200):
@@ -61,7 +59,7 @@ def test_intervals_contain_the_true_deviation() -> None:
 
 @pytest.mark.slow
 @needs_any
-def test_the_study_finds_the_border_of_the_rings(tmp_path: Path) -> None:
+def test_the_study_finds_the_border_of_the_rings(tmp_path):
     settings = SurveySettings(
         candidates=CandidateSettings(sensors=("type2",), heights=(5.4,), spacing=12.0),
         visibility=VisibilitySettings(0.5),

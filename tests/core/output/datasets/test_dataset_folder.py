@@ -122,14 +122,7 @@ def test_a_manifest_that_is_none_is_refused(text, tmp_path):
 
 @pytest.mark.parametrize(
     ("key", "wrong"),
-    [
-        *((key, 5) for key in ("format", "settings", "classes", "runs", "files")),
-        *(
-            ("runs", {name: 1.5})
-            for name in ("name", "split", "key", "simulation_key", "finished", "frames", "samples")
-        ),
-        ("runs", {"samples": [{"name": "a", "frame": "a", "files": 5}]}),
-    ],
+    [("files", 5), ("runs", {"frames": 1.5}), ("runs", {"samples": [{"name": "a", "frame": "a", "files": 5}]})],
 )
 def test_a_manifest_with_a_wrong_value_is_refused(tmp_path, key, wrong):
     write("kitti", make_frames(), make_run(), tmp_path)

@@ -1,11 +1,8 @@
 """Catalogue, beam patterns and the disturbance of returns."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 from statistics import NormalDist
-from typing import Any
 
 import numpy as np
 import pytest
@@ -15,7 +12,6 @@ from hypothesis import strategies as st
 from seip_addon.core.base.errors import SeipError
 from seip_addon.core.sensing.lidar.carla_dropoff import CarlaDropoff
 from seip_addon.core.sensing.lidar.catalogue import load_catalogue
-from seip_addon.core.sensing.lidar.model import LidarModel
 from seip_addon.core.sensing.lidar.noisy_returns import measured_returns, return_chance
 from seip_addon.core.sensing.lidar.range_equation import RangeEquation
 from tests.builders.traffic_by_hand import make_model
@@ -36,7 +32,7 @@ GOOD = {
 }
 
 
-def write_model(path: Path, **changes: str | None) -> Path:
+def write_model(path, **changes):
     entries = {key: value for key, value in (GOOD | changes).items() if value is not None}
     path.write_text("[mine]\n" + "".join(f"{key} = {value}\n" for key, value in entries.items()), encoding="utf-8")
     return path
@@ -50,9 +46,7 @@ def write_model(path: Path, **changes: str | None) -> Path:
         ("type3", 128, -25, 15, 300, 4.8e6, (70e3, 90e3)),
     ],
 )
-def test_the_studys_types_have_the_studys_figures(
-    key: str, channels: int, low: float, high: float, reach: float, points: float, price: tuple[float, float]
-) -> None:
+def test_the_studys_types_have_the_studys_figures(key, channels, low, high, reach, points, price):
     model = CATALOGUE[key]
     assert (model.channels, model.max_range, model.price_range) == (channels, reach, price)
     assert np.degrees([model.elevations.min(), model.elevations.max()]) == pytest.approx([low, high])
@@ -62,7 +56,7 @@ def test_the_studys_types_have_the_studys_figures(
     assert model.price == sum(price) / 2
 
 
-def test_the_catalogue_holds_real_sensors_with_uneven_tables() -> None:
+def test_the_catalogue_holds_real_sensors_with_uneven_tables():
     real = [model for model in CATALOGUE.values() if model.manufacturer != "generic"]
     assert len(real) >= 6
     gaps = {model.key: np.diff(np.sort(model.elevations)) for model in real}
@@ -71,7 +65,7 @@ def test_the_catalogue_holds_real_sensors_with_uneven_tables() -> None:
 
 
 @pytest.mark.parametrize("key", ["type1", "vls128"])
-def test_directions_are_unit_vectors_at_the_published_angles(key: str) -> None:
+def test_directions_are_unit_vectors_at_the_published_angles(key):
     model = CATALOGUE[key]
     yaw = 0.3
     rays = beam_directions(model, yaw)
@@ -85,9 +79,7 @@ def test_directions_are_unit_vectors_at_the_published_angles(key: str) -> None:
 
 
 @pytest.mark.parametrize("degrees", [1, 120, 180, 359])
-def test_columns_of_a_limited_field_of_view_lie_evenly_and_symmetrically_about_azimuth_zero(
-    tmp_path: Path, degrees: int
-) -> None:
+def test_columns_of_a_limited_field_of_view_lie_evenly_and_symmetrically_about_azimuth_zero(tmp_path, degrees):
     model = load_catalogue([write_model(tmp_path / "mine.toml", horizontal_field_of_view_deg=str(degrees))])["mine"]
     rays = beam_directions(model, 0.3)
     azimuth = np.degrees(np.arctan2(rays[0, :, 1], rays[0, :, 0]) - 0.3)
@@ -98,7 +90,7 @@ def test_columns_of_a_limited_field_of_view_lie_evenly_and_symmetrically_about_a
     assert not model.all_round
 
 
-def test_a_file_of_the_users_adds_and_replaces(tmp_path: Path) -> None:
+def test_a_file_of_the_users_adds_and_replaces(tmp_path):
     catalogue = load_catalogue([write_model(tmp_path / "mine.toml")])
     assert list(catalogue) == [*CATALOGUE, "mine"]
     mine = catalogue["mine"]
@@ -108,8 +100,8 @@ def test_a_file_of_the_users_adds_and_replaces(tmp_path: Path) -> None:
     assert load_catalogue([tmp_path / "own.toml"])["type1"].name == "Mine"
 
 
-def test_a_law_follows_from_published_ranges_or_is_assumed_and_said_to_be(tmp_path: Path) -> None:
-    def law_of(**changes: str) -> tuple[object, str]:
+def test_a_law_follows_from_published_ranges_or_is_assumed_and_said_to_be(tmp_path):
+    def law_of(**changes):
         mine = load_catalogue([write_model(tmp_path / "mine.toml", **changes)])["mine"]
         return mine.law, mine.assumed
 
@@ -162,7 +154,7 @@ def test_a_law_follows_from_published_ranges_or_is_assumed_and_said_to_be(tmp_pa
         ({"detection_law": "[-12.0, 0.001, 0.95]"}, r"the spread of detection is 0.001, not 0.05 to 10"),
     ],
 )
-def test_each_fault_of_a_model_has_its_sentence(tmp_path: Path, changes: dict[str, str | None], words: str) -> None:
+def test_each_fault_of_a_model_has_its_sentence(tmp_path, changes, words):
     path = write_model(tmp_path / "mine.toml", **changes)
     with pytest.raises(SeipError, match=words) as caught:
         load_catalogue([path])
@@ -170,7 +162,7 @@ def test_each_fault_of_a_model_has_its_sentence(tmp_path: Path, changes: dict[st
     assert "mine.toml" in str(caught.value)
 
 
-def test_files_that_are_no_catalogue(tmp_path: Path) -> None:
+def test_files_that_are_no_catalogue(tmp_path):
     with pytest.raises(SeipError, match="cannot read"):
         load_catalogue([tmp_path / "absent.toml"])
     (tmp_path / "bad.toml").write_text("[mine")
@@ -186,20 +178,20 @@ def test_files_that_are_no_catalogue(tmp_path: Path) -> None:
         load_catalogue(["pandar64=unit.csv"])
 
 
-def test_intensity_falls_with_range_and_incidence() -> None:
+def test_intensity_falls_with_range_and_incidence():
     law = CATALOGUE["type1"].law
     intensity = law.intensity(np.array([0.0, 100.0, 50.0]), np.array([1.0, 1.0, 0.5]))
     np.testing.assert_allclose(intensity, [1, math.exp(-0.4), 0.5 * math.exp(-0.2)])
 
 
-def sensor(**changes: Any) -> LidarModel:
+def sensor(**changes):
     return make_model(
         **{"elevations": np.array([0.0, -0.1]), "min_range": 1.0, "points_per_second": 2000.0, "law": CarlaDropoff()}
         | changes
     )
 
 
-def test_noise_and_drop_off_have_their_rates() -> None:
+def test_noise_and_drop_off_have_their_rates():
     law = CarlaDropoff(attenuation=0.0, general=0.25, zero_intensity=0.4, intensity_limit=0.8)
     model = sensor(law=law, range_noise_std=0.05)
     count = 200_000
@@ -214,10 +206,10 @@ def test_noise_and_drop_off_have_their_rates() -> None:
     assert noise.std() == pytest.approx(0.05, rel=0.02)
 
 
-def test_measured_returns_follow_the_seed_and_leave_misses() -> None:
+def test_measured_returns_follow_the_seed_and_leave_misses():
     model = sensor()
 
-    def returns(*distance: float) -> tuple[list[int], np.ndarray]:
+    def returns(*distance):
         far = np.array(distance)
         ray, measured = measured_returns(model, far, return_chance(model, far, np.ones(5)), np.random.default_rng(7))
         return ray.tolist(), measured
@@ -230,13 +222,13 @@ def test_measured_returns_follow_the_seed_and_leave_misses() -> None:
     assert (other[[2, 4]] == first[1]).all()
 
 
-def test_the_documented_example_is_a_catalogue(tmp_path: Path) -> None:
+def test_the_documented_example_is_a_catalogue(tmp_path):
     text = (Path(__file__).resolve().parents[4] / "docs" / "sensors.md").read_text(encoding="utf-8")
     (tmp_path / "mine.toml").write_text(text.split("```toml\n")[1].split("```")[0], encoding="utf-8")
     assert load_catalogue([tmp_path / "mine.toml"])["corner32"].price == 9_000
 
 
-def test_the_documentation_names_every_sensor() -> None:
+def test_the_documentation_names_every_sensor():
     text = (Path(__file__).resolve().parents[4] / "docs" / "sensors.md").read_text(encoding="utf-8")
     assert all(f"| `{key}` |" in text for key in load_catalogue())
 

@@ -1,7 +1,5 @@
 """Rings are where the beams meet the road."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 
@@ -57,7 +55,7 @@ VIEWS = st.one_of(st.sampled_from([math.tau, math.pi, math.radians(359.9), math.
 
 
 @given(VIEWS, st.integers(1, 200), st.integers(0, 2**32 - 1))
-def test_the_steps_of_arcs_are_found_each_once(view: float, count: int, seed: int) -> None:
+def test_the_steps_of_arcs_are_found_each_once(view, count, seed):
     random = np.random.default_rng(seed)
     middle, half = random.uniform(-12, 12, 40), random.choice([0.01, 0.4, 3.1, math.pi, 4.0], 40) * random.random(40)
     half[:3] = math.pi, math.pi - 1e-9, math.pi + 1e-9

@@ -1,7 +1,5 @@
 """Runs on disk: whole frames, the same whether stopped or not, and nothing else's."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from itertools import islice
@@ -25,7 +23,7 @@ from tests.engines import ANY, needs_any
 pytestmark = needs_any
 
 
-def make_run(**changes) -> Run:
+def make_run(**changes):
     cars = parked((10.0, 2.0, 0.0, 0.3, 0.0), (-8.0, 5.0, 0.0, 1.0, 0.0))
     run = Run(
         static=make_static(ground()),
@@ -45,11 +43,11 @@ def steps(folder, run):
     return write_run(folder, run, simulation)
 
 
-def contents(folder) -> dict[str, bytes]:
+def contents(folder):
     return {str(path.relative_to(folder)): path.read_bytes() for path in sorted(folder.rglob("*")) if path.is_file()}
 
 
-def test_a_run_says_what_it_is_made_of_and_reads_back(tmp_path) -> None:
+def test_a_run_says_what_it_is_made_of_and_reads_back(tmp_path):
     record = finish(steps(tmp_path / "run", make_run()))
     assert record == load_manifest(tmp_path / "run")
     assert (record["complete"], record["seeds"]) == (True, {"returns": 3})
@@ -63,7 +61,7 @@ def test_a_run_says_what_it_is_made_of_and_reads_back(tmp_path) -> None:
         assert set(frame.sensor.tolist()) == {0, 1}
 
 
-def test_the_same_run_is_the_same_bytes_stopped_or_not(tmp_path) -> None:
+def test_the_same_run_is_the_same_bytes_stopped_or_not(tmp_path):
     finish(steps(tmp_path / "one", make_run()))
     stopped = steps(tmp_path / "two", make_run())
     list(islice(stopped, 3))
@@ -90,7 +88,7 @@ def test_the_same_run_is_the_same_bytes_stopped_or_not(tmp_path) -> None:
     ],
     ids=["seed", "times", "scene", "reflectivity", "traffic", "sensor", "version"],
 )
-def test_a_folder_of_other_settings_is_left_alone(tmp_path, changes) -> None:
+def test_a_folder_of_other_settings_is_left_alone(tmp_path, changes):
     finish(steps(tmp_path, make_run()))
     before = contents(tmp_path)
     with pytest.raises(SeipError, match="different scene, traffic or settings"):
@@ -102,7 +100,7 @@ def test_a_folder_of_other_settings_is_left_alone(tmp_path, changes) -> None:
     ("key", "wrong"),
     [("complete", 5), ("frames", ["000000"])],
 )
-def test_a_manifest_with_a_wrong_value_is_refused(tmp_path, key, wrong) -> None:
+def test_a_manifest_with_a_wrong_value_is_refused(tmp_path, key, wrong):
     finish(steps(tmp_path, make_run()))
     path = tmp_path / "manifest.json"
     record = json.loads(path.read_text(encoding="utf-8"))
@@ -111,7 +109,7 @@ def test_a_manifest_with_a_wrong_value_is_refused(tmp_path, key, wrong) -> None:
         list(load_frames(tmp_path))
 
 
-def test_a_manifest_of_another_version_has_its_sentence(tmp_path) -> None:
+def test_a_manifest_of_another_version_has_its_sentence(tmp_path):
     (tmp_path / "manifest.json").write_text(json.dumps({"schema": "seip-run/9", "key": "", "frames": []}))
     with pytest.raises(SeipError, match="written by another version"):
         load_manifest(tmp_path)

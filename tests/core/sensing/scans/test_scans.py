@@ -170,11 +170,7 @@ def places(draw):
         roll = np.array(
             [[1, 0, 0], [0, math.cos(tilt[1]), -math.sin(tilt[1])], [0, math.sin(tilt[1]), math.cos(tilt[1])]]
         )
-        model = make_model(
-            azimuth_offsets=random.uniform(-0.1, 0.1, 7),
-            max_range=float(random.uniform(15, 90)),
-            field_of_view=random.choice([math.tau, 2.0, math.radians(359)]),
-        )
+        model = make_model(azimuth_offsets=random.uniform(-0.1, 0.1, 7), max_range=float(random.uniform(15, 90)))
         xyz = random.uniform((-20, -20, 1.8), (20, 20, 8))
         sensors.append(MountedSensor(f"S{number}", model, xyz, turned @ roll))
     return make_static(ground(), *walls), sensors, parked(*poses)

@@ -1,7 +1,5 @@
 """What is seen between vehicles: against casting every ray at every triangle, and where the answer is plain."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 from headless.studies.benchmark.visibility import seen_by_tilted_full_scan

@@ -1,7 +1,5 @@
 """Both engines against plain float64 arithmetic."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -9,7 +7,6 @@ from hypothesis import strategies as st
 
 from seip_addon.core.base.errors import SeipError
 from seip_addon.core.sensing.visibility.ray_casting import BvhRayCaster, EmbreeRayCaster, make_ray_caster
-from seip_addon.core.sensing.visibility.settings import Engine
 from seip_addon.core.sensing.visibility.target_index import TargetIndex
 from tests.engines import each_engine
 from tests.oracles.float64_rays import first_hits
@@ -18,13 +15,13 @@ SQUARE = np.array([[[-1, -1, 5], [1, -1, 5], [1, 1, 5]], [[-1, -1, 5], [1, 1, 5]
 UP = np.array([[0.0, 0.0, 1.0]])
 
 
-def unit(random: np.random.Generator, count: int) -> np.ndarray:
+def unit(random, count):
     rays = random.normal(size=(count, 3))
     return rays / np.linalg.norm(rays, axis=1, keepdims=True)
 
 
 @each_engine
-def test_hit_miss_and_reach(engine: Engine) -> None:
+def test_hit_miss_and_reach(engine):
     caster = make_ray_caster(SQUARE, engine)
     assert type(caster) is {"bvh": BvhRayCaster, "embree": EmbreeRayCaster}[engine]
     towards_corner = np.array([0.5, -0.25, 5.0]) / np.linalg.norm([0.5, -0.25, 5.0])
@@ -36,7 +33,7 @@ def test_hit_miss_and_reach(engine: Engine) -> None:
 
 
 @each_engine
-def test_map_coordinates_lose_nothing(engine: Engine) -> None:
+def test_map_coordinates_lose_nothing(engine):
     random = np.random.default_rng(3)
     triangles = random.uniform(-40, 40, (300, 1, 3)) + random.normal(0, 3, (300, 3, 3))
     rays = unit(random, 2000)
@@ -50,7 +47,7 @@ def test_map_coordinates_lose_nothing(engine: Engine) -> None:
 
 @each_engine
 @given(seed=st.integers(0, 2**32 - 1))
-def test_hits_are_those_of_float64_arithmetic(engine: Engine, seed: int) -> None:
+def test_hits_are_those_of_float64_arithmetic(engine, seed):
     random = np.random.default_rng(seed)
     triangles = random.uniform(-20, 20, (60, 1, 3)) + random.normal(0, 4, (60, 3, 3))
     rays = unit(random, 400)
@@ -62,7 +59,7 @@ def test_hits_are_those_of_float64_arithmetic(engine: Engine, seed: int) -> None
 
 
 @each_engine
-def test_a_hit_is_the_same_whatever_else_is_cast_or_kept_and_however_far_the_ray_goes(engine: Engine) -> None:
+def test_a_hit_is_the_same_whatever_else_is_cast_or_kept_and_however_far_the_ray_goes(engine):
     random = np.random.default_rng(6)
     triangles = random.uniform(-20, 20, (500, 1, 3)) + random.normal(0, 2, (500, 3, 3))
     rays = unit(random, 1000)
@@ -83,12 +80,12 @@ def test_a_hit_is_the_same_whatever_else_is_cast_or_kept_and_however_far_the_ray
     assert (short[0] == np.where(distance <= reach, distance, np.inf)).all()
 
 
-def test_an_unknown_engine_names_the_known() -> None:
+def test_an_unknown_engine_names_the_known():
     with pytest.raises(SeipError, match="auto, bvh or embree"):
         make_ray_caster(SQUARE, "optix")  # type: ignore[arg-type]
 
 
-def test_the_distance_is_strictly_less() -> None:
+def test_the_distance_is_strictly_less():
     index = TargetIndex(np.array([[0.0, 0.0, 0.0]]), 1.0)
     assert index.pairs_within_delta(np.array([[1.0, 0.0, 0.0]]))[1].tolist() == []
     assert index.pairs_within_delta(np.array([[np.nextafter(1.0, 0.0), 0.0, 0.0]]))[1].tolist() == [0]
@@ -102,7 +99,7 @@ def test_the_distance_is_strictly_less() -> None:
     st.floats(1e-3, 8),
     st.sampled_from([0.0, 5e6]),
 )
-def test_pairs_are_all_that_are_near(seed: int, targets: int, points: int, delta: float, shift: float) -> None:
+def test_pairs_are_all_that_are_near(seed, targets, points, delta, shift):
     random = np.random.default_rng(seed)
     xyz, returns = random.uniform(-5, 5, (targets, 3)) + shift, random.uniform(-8, 8, (points, 3)) + shift
     gap = returns[:, None] - xyz[None]

@@ -1,7 +1,5 @@
 """Ranges on the road: the law on a level road, and the share of a region that lies beyond."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -73,7 +71,7 @@ def test_sensors_that_see_through_any_weather_are_named():
     assert warning.endswith("os1_128 must detect it: do not compare the two")
 
 
-def geometry(triangles: np.ndarray, *strays: Mesh) -> SceneGeometry:
+def geometry(triangles, *strays):
     road = Mesh("carriageway", triangles)
     region = shapely.box(*triangles.min(axis=(0, 1))[:2], *triangles.max(axis=(0, 1))[:2])
     pole = Pole("pole", np.array([0.0, 6.0, 0.0]))
@@ -83,14 +81,14 @@ def geometry(triangles: np.ndarray, *strays: Mesh) -> SceneGeometry:
 GROUND = np.array([[[-20.0, -4, 0], [20, -4, 0], [20, 4, 0]], [[-20, -4, 0], [20, 4, 0], [-20, 4, 0]]])
 
 
-def moved(x: float, y: float) -> np.ndarray:
+def moved(x, y):
     return GROUND + np.array([x, y, 0.0])
 
 
 SHORT = SurveySettings(candidates=CandidateSettings(sensors=("type3",), heights=(5.4,), setback=0.5))
 
 
-def test_what_was_forgotten_far_away_changes_nothing_and_is_named() -> None:
+def test_what_was_forgotten_far_away_changes_nothing_and_is_named():
     plain = lay_out(geometry(GROUND), SHORT)
     stray = lay_out(geometry(GROUND, Mesh("left behind", moved(5e5, 0)), Mesh("another", moved(0, 400))), SHORT)
     np.testing.assert_array_equal(stray.site.triangles, plain.site.triangles)

@@ -1,25 +1,18 @@
 """The visibility grid against a full scan, against plain float64 arithmetic, and under moves of the scene."""
 
-from __future__ import annotations
-
 import math
-from collections import Counter
 from dataclasses import replace
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 from shapely import box
 
 from seip_addon.core.base.errors import SeipError
 from seip_addon.core.base.progress import finish
 from seip_addon.core.sensing.lidar.carla_dropoff import CarlaDropoff
 from seip_addon.core.sensing.lidar.catalogue import load_catalogue
-from seip_addon.core.sensing.lidar.model import LidarModel
 from seip_addon.core.sensing.lidar.range_equation import RangeEquation
 from seip_addon.core.sensing.visibility.grid import (
     VisibilityGrid,
@@ -31,7 +24,6 @@ from seip_addon.core.sensing.visibility.grid import (
 )
 from seip_addon.core.sensing.visibility.ray_casting import make_ray_caster
 from seip_addon.core.sensing.visibility.ring_resolution import resolution_warnings
-from seip_addon.core.sensing.visibility.settings import Engine
 from seip_addon.core.site.site import Site, Targets
 from tests.builders.synthetic_junction import junction_site, make_candidates, prism, rectangle, varied_reflectivity
 from tests.builders.traffic_by_hand import make_model
@@ -41,10 +33,8 @@ from tests.oracles.full_scan import full_scan
 from tests.oracles.random_cases import cases
 from tests.oracles.visibility_search import FAULTS, assess, draw_case, search, sentence
 
-Float = NDArray[np.float64]
 
-
-def small_model(key: str, channels: int, steps: int) -> LidarModel:
+def small_model(key, channels, steps):
     """A sensor small enough for brute force, with uneven elevations and azimuth offsets."""
     place = np.linspace(0, 1, channels)
     return make_model(
@@ -65,7 +55,7 @@ PHYSICAL = {
 }
 
 
-def random_site(seed: int, poses: int = 3) -> Site:
+def random_site(seed, poses=3):
     """A sloping patch of road with boxes on it, targets on the road, sensors above."""
     random = np.random.default_rng(seed)
     slope = random.normal(0, 0.03, 2)
@@ -92,11 +82,11 @@ def random_site(seed: int, poses: int = 3) -> Site:
     )
 
 
-def grid_of(site: Site, settings: VisibilitySettings, engine: Engine = ANY) -> VisibilityGrid:
+def grid_of(site, settings, engine=ANY):
     return finish(compute_visibility(site, MODELS, settings, engine))
 
 
-def nearest_returns(site: Site) -> Float:
+def nearest_returns(site):
     """Distance of each target's nearest return at each pose, (c, t)."""
     poses = site.candidates
     return np.array(
@@ -111,7 +101,7 @@ def nearest_returns(site: Site) -> Float:
 @pytest.mark.parametrize(
     ("key", "share"), [("type1", 0.04), pytest.param("type3", 0.03, marks=pytest.mark.slow), ("vls128", 0.03)]
 )
-def test_same_as_the_full_scan_on_a_junction(engine: Engine, key: str, share: float) -> None:
+def test_same_as_the_full_scan_on_a_junction(engine, key, share):
     models = load_catalogue()
     site = junction_site(positions=1, sensors=[key], heights=[5.4])
     caster = make_ray_caster(site.triangles, engine)
@@ -123,7 +113,7 @@ def test_same_as_the_full_scan_on_a_junction(engine: Engine, key: str, share: fl
     assert lazy.parameters["rays_cast"] < share * rays
 
 
-def decided_site(seed: int, delta: float) -> Site:
+def decided_site(seed, delta):
     """A random site without the targets that some pose's nearest return passes δ by a millimetre or less."""
     site = random_site(seed)
     decided = (np.abs(nearest_returns(site) - delta) >= 1e-3).all(axis=0)
@@ -131,7 +121,7 @@ def decided_site(seed: int, delta: float) -> Site:
     return replace(site, targets=Targets(xyz, np.ones(len(xyz)), np.zeros(len(xyz), dtype=bool), 1.0))
 
 
-def moved(site: Site, shift: Float, turn: float) -> Site:
+def moved(site, shift, turn):
     """Turn scene, targets, poses and beams about the z axis, then shift them."""
     rotation = np.array([[math.cos(turn), -math.sin(turn), 0], [math.sin(turn), math.cos(turn), 0], [0, 0, 1]])
     poses = site.candidates
@@ -146,7 +136,7 @@ def moved(site: Site, shift: Float, turn: float) -> Site:
 @each_engine
 @cases(30)
 @given(seed=st.integers(0, 2**32 - 1), turn=st.floats(-7, 7))
-def test_moving_everything_changes_nothing(engine: Engine, seed: int, turn: float) -> None:
+def test_moving_everything_changes_nothing(engine, seed, turn):
     settings = VisibilitySettings(0.6)
     site = decided_site(seed, settings.delta)
     expected = grid_of(site, settings, engine).visible
@@ -160,7 +150,7 @@ def test_moving_everything_changes_nothing(engine: Engine, seed: int, turn: floa
     "values",
     [(0,), (math.nan,), (math.inf,), (1, -0.1), (1, 1.1), (1, 0, 0), (1, 0, 1)],
 )
-def test_settings_that_mean_nothing(values: tuple[float, ...]) -> None:
+def test_settings_that_mean_nothing(values):
     with pytest.raises(SeipError):
         VisibilitySettings(*values)
 
@@ -168,12 +158,12 @@ def test_settings_that_mean_nothing(values: tuple[float, ...]) -> None:
 class Casting:
     """Computation of rows that notes the poses and fails after a number of them."""
 
-    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+    def __init__(self, monkeypatch):
         self.poses: list[int] = []
         self.most = 0
         monkeypatch.setattr("seip_addon.core.sensing.visibility.grid.seen_from", self)
 
-    def __call__(self, *args: Any) -> Any:
+    def __call__(self, *args):
         if len(self.poses) == self.most:
             raise SeipError("ended")
         self.poses.append(args[-1])
@@ -181,7 +171,7 @@ class Casting:
 
 
 @needs_any
-def test_an_interrupted_run_goes_on_from_its_finished_rows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_interrupted_run_goes_on_from_its_finished_rows(tmp_path, monkeypatch):
     site, models, settings = random_site(2), MODELS, VisibilitySettings()
     stored = lambda name: finish(stored_visibility(tmp_path / name, site, models, settings, ANY, threads=1))  # noqa: E731
     whole = stored("whole.npz")
@@ -201,9 +191,7 @@ def test_an_interrupted_run_goes_on_from_its_finished_rows(tmp_path: Path, monke
 
 
 @needs_any
-def test_rows_of_other_inputs_or_damaged_ones_are_computed_again(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_rows_of_other_inputs_or_damaged_ones_are_computed_again(tmp_path, monkeypatch):
     site, path = random_site(2), tmp_path / "grid.npz"
     whole = grid_of(site, VisibilitySettings())
     with monkeypatch.context() as patch:
@@ -219,7 +207,7 @@ def test_rows_of_other_inputs_or_damaged_ones_are_computed_again(
 
 
 @needs_any
-def test_files_that_are_no_grid(tmp_path: Path) -> None:
+def test_files_that_are_no_grid(tmp_path):
     grid_of(random_site(2), VisibilitySettings()).save(tmp_path / "good.npz")
     whole = (tmp_path / "good.npz").read_bytes()
     bad = tmp_path / "bad.npz"
@@ -234,7 +222,7 @@ def test_files_that_are_no_grid(tmp_path: Path) -> None:
         VisibilityGrid.load(bad)
 
 
-def test_the_key_follows_from_what_the_grid_follows_from() -> None:
+def test_the_key_follows_from_what_the_grid_follows_from():
     site, settings = random_site(3), VisibilitySettings()
     key = visibility_key(site, MODELS, settings, "bvh")
     same = replace(site, name="other name", triangles=site.triangles.copy())
@@ -268,7 +256,7 @@ def test_the_key_follows_from_what_the_grid_follows_from() -> None:
     assert len({key, *others}) == 1 + len(others)
 
 
-def test_warnings_name_the_radius_from_which_rings_are_too_far_apart() -> None:
+def test_warnings_name_the_radius_from_which_rings_are_too_far_apart():
     models = load_catalogue()
     site = junction_site(positions=8, sensors=["type1"], heights=[8.0])
     (warning,) = resolution_warnings(site, models, VisibilitySettings(1.0))
@@ -277,7 +265,7 @@ def test_warnings_name_the_radius_from_which_rings_are_too_far_apart() -> None:
     assert resolution_warnings(site, models, VisibilitySettings(80.0)) == ()
 
 
-def test_warnings_say_when_targets_are_too_far_apart_for_delta() -> None:
+def test_warnings_say_when_targets_are_too_far_apart_for_delta():
     site = junction_site(positions=8, sensors=["type3"], heights=[8.0], spacing=2.0)
     warnings = resolution_warnings(site, load_catalogue(), VisibilitySettings(1.0))
     assert any("targets are 2 m apart and δ is 1 m" in warning for warning in warnings)
@@ -287,14 +275,14 @@ QUICK = 12
 MANY, MOST = 25, 375
 
 
-def no_fault(total: Counter[str]) -> None:
+def no_fault(total):
     assert not any(total[fault] for fault in FAULTS), sentence(total)
     assert total["seen"] > 0.02 * total["entries"]
     assert total["undecided"] < 0.01 * total["entries"]
 
 
 @each_engine
-def test_grids_of_random_scenes(engine: Engine) -> None:
+def test_grids_of_random_scenes(engine):
     no_fault(search([engine], 16, first_seed=40))  # faults that there were showed in scenes 42, 43, 51 and 52
 
 
@@ -306,12 +294,12 @@ def test_grids_of_random_scenes(engine: Engine) -> None:
     ],
 )
 @each_engine
-def test_grids_of_many_random_scenes(engine: Engine, first: int, number: int) -> None:
+def test_grids_of_many_random_scenes(engine, first, number):
     no_fault(search([engine], number, first_seed=first))
 
 
 @pytest.mark.slow
-def test_the_arithmetic_decides_nearly_all_by_itself() -> None:
+def test_the_arithmetic_decides_nearly_all_by_itself():
     """The reference is no echo of what it evaluates: it says seen and unseen of what shares no code with it."""
     verdicts = [assess(draw_case(seed)) for seed in range(QUICK)]
     undecided = sum(int(verdict.undecided.sum()) for verdict in verdicts)

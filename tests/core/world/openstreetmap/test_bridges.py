@@ -108,6 +108,26 @@ def check(streets, most=STEEPEST):
     assert max(gaps(streets)) < GAP
 
 
+def test_slip_roads_of_an_exit_climb_to_the_bridge(tmp_path):
+    extract = Extract()
+    for x, ends in ((-8, (300, -300)), (8, (-300, 300))):
+        side = -1 if x < 0 else 1
+        extract.way(
+            [(x, ends[0]), (x, side * -180), (x, side * 180), (x, ends[1])], highway="motorway", name="A 1", lanes=2
+        )
+        extract.way([(x, side * -180), (3 * x, side * -90), (60 * side, 0)], highway="motorway_link")
+        extract.way([(60 * side, 0), (3 * x, side * 90), (x, side * 180)], highway="motorway_link")
+    tags = {"highway": "secondary", "name": "Cross Road", "lanes": 2}
+    extract.way([(-300, 0), (-60, 0), (-18, 0)], **tags)
+    extract.way([(-18, 0), (18, 0)], bridge="yes", layer="1", **tags)
+    extract.way([(18, 0), (60, 0), (300, 0)], **tags)
+    site, streets = built(extract, tmp_path, level=("Cross Road",))
+    check(streets)
+    assert min(clearances(streets, "Cross Road", "A 1")) > ROAD_CLEARANCE - 0.05
+    assert max(abs(lane.left[:, 2]).max() for lane in lanes_of(streets, "A 1")) < 0.5
+    assert not any("flat" in note for note in site.model.notes)
+
+
 def test_an_underpass_is_lowered_under_a_street_that_stays(tmp_path):
     extract = Extract()
     extract.way([(-300, 0), (300, 0)], highway="primary", name="High Road", lanes=2)

@@ -194,6 +194,7 @@ CUT = "the answer of 127.0.0.1 is cut off: try again"
 
 @pytest.mark.parametrize(("answer", "complaint"), [
     (Answer(LOGIN), "answers with a web page in place of map data: sign in to the network in your browser"),
+    (Answer(LOGIN, 511), "answers with a web page in place of map data: sign in"),
     (Answer("proxy", 407), r"a proxy refuses the connection to 127.0.0.1 \(407 .*: name one with its user and"),
     (Answer(overpass_xml(Extract())), "no streets within 790 m of 52.50000, 13.40000: give a place near a street"),
     (Answer(overpass_xml(crossing(), OUT_OF_MEMORY)), r"too much data for 127.0.0.1 \(.*256 MB.*a smaller radius"),
@@ -202,6 +203,7 @@ CUT = "the answer of 127.0.0.1 is cut off: try again"
     (Answer(PAGE.format("line 1: parse error: Unknown type"), 400), r"refuses the query \(400 line 1: parse error"),
     (Answer("gone", 404), r"refuses the query \(404 Not Found\): check the address of the Overpass server"),
     (Answer('{"elements": []}'), "the answer of 127.0.0.1 is not map data"),
+    (Answer(PLACE[:-200]), CUT),
     (Answer(PLACE, sent=500), CUT),
     (Answer(PLACE, packed=True, sent=500, headers={"Content-Length": ""}), CUT),
     (Answer(PLACE, headers={"Content-Encoding": "gzip"}), CUT),

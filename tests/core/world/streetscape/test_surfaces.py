@@ -10,8 +10,10 @@ import shapely
 from seip_addon.core.base.progress import finish
 from seip_addon.core.site.roles import Role
 from seip_addon.core.workflows.site_building import SiteRequest, build_site
+from seip_addon.core.world.opendrive.lanes import LaneSurface
 from seip_addon.core.world.opendrive.read import read_map
 from seip_addon.core.world.streetscape.description import SiteDescription
+from seip_addon.core.world.streetscape.road_surface import roadside, without_gaps
 from tests.builders.map_models import site_model
 from tests.builders.osm_text import Extract
 from tests.builders.street_map import street_map
@@ -78,3 +80,29 @@ def test_a_mapped_sidewalk_is_the_pavement(tmp_path, away):
         kerb, (low, high) = driven.intersection(north).bounds[3], walked.intersection(north).bounds[1::2]
         assert (low - kerb, high - kerb) == pytest.approx((away - 1.0, away + 1.0), abs=0.1)
     assert not [part for part in site.model.parts if part.name == "Verge strip"]
+
+
+def strip(low_x, low_y, high_x, high_y, lane_type="driving", road="1"):
+    """Return a lane of a junction over a rectangle."""
+    xs = np.array([low_x, high_x], dtype=float)
+    left, right = (np.column_stack([xs, np.full(2, y), np.zeros(2)]) for y in (high_y, low_y))
+    return LaneSurface(road, "7", 0, -1, lane_type, False, xs - low_x, left, right)
+
+
+def around(size):
+    """Return lanes around a square gap."""
+    return (
+        strip(-10, size, 10, size + 4),
+        strip(-10, -4, 10, 0, road="2"),
+        strip(-10, 0, 0, size, road="3"),
+        strip(size, 0, 10, size, road="4"),
+    )
+
+
+@pytest.mark.parametrize(("size", "filled"), [(1.5, True), (3.0, False)])
+def test_a_small_gap_between_the_lanes_of_a_junction_is_no_island(size, filled):
+    lanes = around(size)
+    gap = shapely.box(0, 0, size, size)
+    assert without_gaps(roadside(lanes), lanes).contains(gap.centroid) is filled
+    median = strip(0, 0, size, size, "median", "5")
+    assert not without_gaps(roadside(lanes), (*lanes, median)).contains(gap.centroid)
