@@ -53,7 +53,6 @@ def test_the_folder_holds_every_result(folder):
         "site.npz",
         "scene.glb",
         "plan.png",
-        "sensors.png",
         "placed.blend",
     }
 

@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterable
 from html import escape
 
-from .blocks import Block, Bullets, Card, Code, Facts, Paragraph, Picture, Pictures, Report, Table
+from .blocks import Block, Bullets, Card, Code, Facts, Paragraph, Picture, Report, Table
 
 POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'"
 """Nothing is fetched, and no script runs, whatever stands in the page."""
@@ -24,10 +24,7 @@ figure { margin: 1em 0; break-inside: avoid; }
 img { display: block; max-width: 100%; border: 1px solid #c9d1d7; box-sizing: border-box; }
 figure > img { max-height: 60em; margin: 0 auto; }
 figcaption { color: #5d6b76; font-size: .9em; margin-top: .3em; }
-.pair { display: flex; flex-wrap: wrap; gap: .5em; }
-.pair img { flex: 1 1 16em; min-width: 0; width: 16em; height: auto; }
 .card { border: 1px solid #c9d1d7; border-radius: 4px; padding: 1em; margin: 1em 0; break-inside: avoid; }
-.card figure { margin: 0 0 .8em; }
 dl { display: grid; grid-template-columns: minmax(6em, max-content) 1fr; gap: .25em 1.2em; margin: .6em 0; }
 dt { color: #5d6b76; }
 dd { margin: 0; overflow-wrap: anywhere; font-variant-numeric: tabular-nums; }
@@ -114,9 +111,6 @@ def _block(block: Block) -> str:
         kind = ' class="tall"' if block.tall else ""
         caption = f"<figcaption>{_shown(block.caption)}</figcaption>"
         html = f"<figure{kind}>{_image(block.png, block.caption)}{caption}</figure>"
-    elif isinstance(block, Pictures):
-        images = "".join(_image(png, block.about) for png in block.pngs)
-        html = f'<figure><div class="pair">{images}</div></figure>'
     else:
         inner = "\n".join(_row(block, row, "td") for row in block.rows)
         head = _row(block, block.head, "th")

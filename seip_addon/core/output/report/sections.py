@@ -49,7 +49,6 @@ from .blocks import (
     Facts,
     Paragraph,
     Picture,
-    Pictures,
     Report,
     Table,
     make_sections,
@@ -273,17 +272,11 @@ def _sensors(evidence: Evidence, costs: Costs) -> Iterator[Block]:
         f"altitudes count from {zero}."
     )
     yield Paragraph(
-        "Heights and coordinates are those of the optical centre. On the plans north is up, and small circles are "
-        f"other possible posts. {system} Before work begins, check ownership, foundations, power and underground lines "
-        "on site."
+        f"Heights and coordinates are those of the optical centre. {system} Before work begins, check ownership, "
+        "foundations, power and underground lines on site."
     )
-    for number, (sensor, items) in enumerate(zip(evidence.sensors, costs.items, strict=True)):
-        pictures = evidence.close_ups[number] if number < len(evidence.close_ups) else ()
-        blocks: list[Paragraph | Facts | Pictures] = []
-        if pictures:
-            blocks.append(Pictures(pictures, f"Close-up of {sensor.id} on the plan and in the view."))
-        blocks.append(Facts(tuple(_sensor_facts(evidence, sensor, items))))
-        yield Card(f"{sensor.id}  {sensor.sensor_name}", tuple(blocks))
+    for sensor, items in zip(evidence.sensors, costs.items, strict=True):
+        yield Card(f"{sensor.id}  {sensor.sensor_name}", (Facts(tuple(_sensor_facts(evidence, sensor, items))),))
 
 
 def _sensor_facts(evidence: Evidence, sensor: RecordedSensor, items: Mapping[str, float]) -> Iterator[tuple[str, str]]:
