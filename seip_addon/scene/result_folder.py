@@ -16,8 +16,6 @@ from ..core.choosing.placement.objective import Solution, placement_constraints
 from ..core.output.pictures.colours import packed_counts
 from ..core.output.pictures.labelled_view import save_labelled_view
 from ..core.output.pictures.plan_view import save_plan_view
-from ..core.output.results.candidate_table import save_candidate_table
-from ..core.output.results.carla import save_carla_spawns
 from ..core.output.results.file_names import REPORT_FILES
 from ..core.output.results.geographic_files import LOCATED_FILES, located, save_geojson, save_kml
 from ..core.output.results.placement_record import PlacementRecord, save_placement
@@ -33,7 +31,7 @@ from .render import render_elsewhere
 from .write import shown_legend, write_result
 
 FILES = (
-    *("candidates.csv", "carla_spawn.json", "site.npz", "plan.png", "view.png"),
+    *("site.npz", "plan.png", "view.png"),
     *("scene.glb", "placed.blend", "placement.json"),
 )
 """In the order in which they take their places: where ``placement.json`` stands, everything else does."""
@@ -133,11 +131,8 @@ def write_tables(
 ) -> Generator[Progress, None, None]:
     """Write the files of a result that do not depend on Blender's data."""
     geometry, site, models, deployment = survey.geometry, survey.site, survey.models, solution.deployment
-    yield Progress(0, 3, "writing tables", counted=False)
+    yield Progress(0, 2, "writing tables", counted=False)
     save_placement(part["placement.json"], record)
-    save_carla_spawns(part["carla_spawn.json"], deployment, site.origin)
-    yield Progress(1, 3, "writing tables", counted=False)
-    save_candidate_table(part["candidates.csv"], site, models, survey.grid.visible, deployment)
     problem = placement_constraints(site, models, solution.objective)
     save_site_file(part["site.npz"], record.inputs["visibility"], geometry, site, solution, problem)
     if site.attribution:
@@ -146,6 +141,6 @@ def write_tables(
     if placed is not None:
         save_geojson(part["placement.geojson"], placed)
         save_kml(part["placement.kml"], placed)
-    yield Progress(2, 3, "drawing the plan", counted=False)
+    yield Progress(1, 2, "drawing the plan", counted=False)
     created = record.times.created
     save_plan_view(part["plan.png"], geometry, site, deployment, solution.caption, created=created)
