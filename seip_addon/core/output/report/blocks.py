@@ -21,13 +21,6 @@ class Bullets:
 
 
 @dataclass(frozen=True)
-class Code:
-    """Command line."""
-
-    text: str
-
-
-@dataclass(frozen=True)
 class Table:
     """Table of few and narrow columns, which fit a phone; the columns in ``numbers``, from 0, are aligned right."""
 
@@ -61,7 +54,7 @@ class Card:
     blocks: tuple[Paragraph | Facts, ...]
 
 
-Block = Paragraph | Bullets | Code | Table | Facts | Picture | Card
+Block = Paragraph | Bullets | Table | Facts | Picture | Card
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterable
 from html import escape
 
-from .blocks import Block, Bullets, Card, Code, Facts, Paragraph, Picture, Report, Table
+from .blocks import Block, Bullets, Card, Facts, Paragraph, Picture, Report, Table
 
 POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'"
 """Nothing is fetched, and no script runs, whatever stands in the page."""
@@ -38,7 +38,6 @@ td { overflow-wrap: break-word; }
 th.number { white-space: normal; }
 tr { break-inside: avoid; }
 thead { display: table-header-group; }
-code { display: block; background: #eef1f3; padding: .6em .8em; overflow-wrap: anywhere; white-space: pre-wrap; }
 @page { size: A4; margin: 18mm 16mm; }
 @media (max-width: 30em) {
   body { margin: 1em auto; }
@@ -96,9 +95,8 @@ def _blocks(blocks: Iterable[Block]) -> str:
 
 
 def _block(block: Block) -> str:
-    if isinstance(block, Paragraph | Code):
-        tag = "p" if isinstance(block, Paragraph) else "code"
-        html = f"<{tag}>{_shown(block.text)}</{tag}>"
+    if isinstance(block, Paragraph):
+        html = f"<p>{_shown(block.text)}</p>"
     elif isinstance(block, Bullets):
         html = "<ul>\n" + "\n".join(f"<li>{_shown(line)}</li>" for line in block.lines) + "\n</ul>"
     elif isinstance(block, Facts):

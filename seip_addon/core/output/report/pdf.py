@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from datetime import datetime
 from functools import partial
 from pathlib import Path
-from typing import Any, cast
+from typing import cast
 
 import matplotlib as mpl
 from fpdf import FPDF, FontFace
@@ -16,9 +16,9 @@ from fpdf.enums import Align, TableBordersLayout, VAlign, XPos, YPos
 from PIL import Image
 
 from ...storage.files import whole_file
-from ..pictures.palette import INK, PAPER, SOFT_INK
+from ..pictures.palette import INK, SOFT_INK
 from ..results.file_names import REPORT_FILES
-from .blocks import Block, Bullets, Card, Code, Facts, Paragraph, Picture, Report, Section, Table
+from .blocks import Block, Bullets, Card, Facts, Paragraph, Picture, Report, Section, Table
 from .html import as_html
 
 MARGIN, TOP, BOTTOM = 50.0, 52.0, 56.0
@@ -32,12 +32,11 @@ LEAST_SHARE = 0.65
 """Share of its size to which a picture is reduced to fit on a page; if that is not enough, what follows comes first."""
 HEADING_ROOM, TABLE_ROOM = 90.0, 50.0  # below the top of a heading, and of a table, so that they do not end a page
 MOST_TOGETHER = 12  # rows of a table that stay on one page
-RULE, SHADE = "#c9d1d7", "#eef1f3"
+RULE = "#c9d1d7"
 BULLET_INDENT, CELL_PADDING = 12.0, 3.0
-CODE_PADDING = 6
-TEXT, MONO = "text", "mono"
-FONTS = {(TEXT, ""): "DejaVuSans", (TEXT, "B"): "DejaVuSans-Bold", (MONO, ""): "DejaVuSansMono"}
-"""Files of the type, which Matplotlib brings, by family and style."""
+TEXT = "text"
+FONTS = {"": "DejaVuSans", "B": "DejaVuSans-Bold"}
+"""Files of the type, which Matplotlib brings, by style."""
 
 
 def save_report(folder: Path, report: Report) -> tuple[Path, ...]:
@@ -77,8 +76,8 @@ class _Document(FPDF):
         super().__init__(unit="pt", format="A4")
         self._footer_title = title
         folder = Path(mpl.get_data_path()) / "fonts" / "ttf"
-        for (family, style), file in FONTS.items():
-            self.add_font(family, style, folder / f"{file}.ttf")
+        for style, file in FONTS.items():
+            self.add_font(TEXT, style, folder / f"{file}.ttf")
         self.set_title(title)
         self.set_creator("SEIP for Blender")
         self.set_margins(MARGIN, TOP, MARGIN)
@@ -97,22 +96,12 @@ class _Document(FPDF):
         self.cell(room, SMALL, title if title == self._footer_title else f"{title} …")
         self.cell(60.0, SMALL, f"{self.page_no()} / {{nb}}", align="R")
 
-    def text_lines(  # how text looks
-        self,
-        text: str,
-        size: float,
-        *,
-        style: str = "",
-        color: str = INK,
-        indent: float = 0.0,
-        family: str = TEXT,
-        **more: Any,  # noqa: ANN401  # fpdf2's own
-    ) -> None:
+    def text_lines(self, text: str, size: float, *, style: str = "", color: str = INK, indent: float = 0.0) -> None:
         """Write text in the width of the page, or from an indent on, and go to the next line."""
-        self.set_font(family, style, size)
+        self.set_font(TEXT, style, size)
         self.set_text_color(color)
         self.set_x(MARGIN + indent)
-        self.multi_cell(0, size * LEADING, text, align="L", new_x=XPos.LMARGIN, new_y=YPos.NEXT, **more)
+        self.multi_cell(0, size * LEADING, text, align="L", new_x=XPos.LMARGIN, new_y=YPos.NEXT)
 
     def rule(self, room: float = 4.0) -> None:
         """Draw a line across the page, and leave some room below."""
@@ -197,10 +186,6 @@ def _add_block(pdf: _Document, block: Block, highest: float = MAX_PICTURE_HEIGHT
         pdf.text_lines(block.text, BODY)
     elif isinstance(block, Bullets):
         _add_bullets(pdf, block.lines)
-    elif isinstance(block, Code):
-        pdf.set_fill_color(SHADE)
-        pdf.text_lines(block.text, SMALL, family=MONO, fill=True, padding=CODE_PADDING)
-        pdf.set_fill_color(PAPER)
     elif isinstance(block, Facts):
         _add_facts(pdf, block)
     elif isinstance(block, Card):

@@ -45,7 +45,6 @@ from .blocks import (
     Block,
     Bullets,
     Card,
-    Code,
     Facts,
     Paragraph,
     Picture,
@@ -56,7 +55,6 @@ from .blocks import (
 from .evidence import Evidence, load_evidence
 from .figures import blind_spot_map, front_chart
 from .pdf import save_report
-from .repeat import repeating_command
 from .wording import (
     date,
     dollars,
@@ -109,7 +107,7 @@ def make_report(evidence: Evidence) -> Report:
         "Failures and errors": _losses(evidence),
         "How far the figures can be trusted": _trust(evidence),
         "Sources": _sources(evidence),
-        "Reproduction": _making(evidence),
+        "Reproduction": [Facts(tuple(_settings(evidence)))],
     }
     subtitle = f"Positions of roadside LiDAR sensors, {date(record.times.created)}"
     first = tuple(_first_page(evidence, costs))
@@ -543,17 +541,6 @@ def _sources(evidence: Evidence) -> Iterator[Block]:
     if record.site.assumptions:
         yield Paragraph("What was assumed or left out when the scene was built from the map:")
         yield Bullets(tuple(sentence(note) for note in record.site.assumptions))
-
-
-def _making(evidence: Evidence) -> Iterator[Block]:
-    record = evidence.record
-    command = repeating_command(record)
-    if command:
-        yield Paragraph("This command, run in the result folder, repeats the placement in another folder:")
-        yield Code(command)
-    else:
-        yield Paragraph("No single command repeats this placement.")
-    yield Facts(tuple(_settings(evidence)))
 
 
 def _settings(evidence: Evidence) -> Iterator[tuple[str, str]]:
