@@ -15,14 +15,12 @@ from ..core.output.pictures.labelled_view import save_labelled_view
 from ..core.output.report.sections import write_report
 from ..core.output.results.placement_record import parsed_record
 from ..core.storage.files import check_folder
-from ..scene.blend_file import save_blend
-from ..scene.coverage_colours import show_seen_by
-from ..scene.gltf import save_glb
+from ..scene.blend_file import save_blend, save_glb
 from ..scene.pieces import tidy_pieces
 from ..scene.read import attribution_of
 from ..scene.render import render_elsewhere
 from ..scene.result_folder import result_files, write_tables
-from ..scene.write import coverage_of, shown_legend
+from ..scene.write import coverage_of, show_seen_by, shown_legend
 from . import scene_status
 from .layout import draw_path, draw_reason, draw_run
 from .properties import absolute, saved_path

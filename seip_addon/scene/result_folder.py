@@ -24,8 +24,7 @@ from ..core.site.site import Site
 from ..core.storage.files import digest, unfinished_name
 from ..core.workflows.survey import Survey
 from . import contract
-from .blend_file import save_blend
-from .gltf import save_glb
+from .blend_file import save_blend, save_glb
 from .pieces import tidy_pieces
 from .render import render_elsewhere
 from .write import shown_legend, write_result

@@ -11,10 +11,9 @@ from seip_addon.core.output.pictures import labelled_view
 from seip_addon.core.output.pictures.colours import colouring
 from seip_addon.core.output.pictures.viewpoint import Sight
 from seip_addon.scene import contract
-from seip_addon.scene.coverage_colours import colour_coverage
 from seip_addon.scene.materials import linear
 from seip_addon.scene.render import shot_of, take
-from seip_addon.scene.write import LIFT, clear_result, shown_legend, write_result
+from seip_addon.scene.write import LIFT, clear_result, colour_coverage, shown_legend, write_result
 from tests.builders.scene_by_hand import make_scene
 from tests.builders.small_junction import make_example
 
