@@ -1,14 +1,13 @@
-"""Pictures that only a report has: the map of blind spots, and quality against the number of sensors."""
+"""The map of blind spots, a picture that only a report has."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.colors import ListedColormap
 
 from ...base.arrays import Float
-from ..pictures.chart_style import new_figure, style_axes
 from ..pictures.drawing import (
     Style,
     add_axes,
@@ -18,7 +17,7 @@ from ..pictures.drawing import (
     new_page,
     window_around,
 )
-from ..pictures.palette import INK, PAPER, SEEN_COLOURS, SOFT_INK
+from ..pictures.palette import INK, PAPER, SEEN_COLOURS
 from .blind_spots import BlindSpot
 from .evidence import Evidence
 
@@ -26,9 +25,7 @@ DPI = 150
 MAP_WIDTH = 7.2  # inches
 MAP_SHAPES = (4.0 / MAP_WIDTH, 8.0 / MAP_WIDTH)  # least and largest height, in widths
 MARGIN = 6.0  # metres around the road
-CHART_SIZE = (7.2, 3.6)  # inches
 NUMBER_SIZE = 10.0  # points
-MOST_LABELLED = 8  # points of the chart that have room for labels
 
 
 def blind_spot_map(evidence: Evidence, spots: Sequence[BlindSpot]) -> bytes:
@@ -76,38 +73,3 @@ def _apart(points: Float, distance: float) -> Float:
                 way = away[nearest] / gaps[nearest] if gaps[nearest] > 0 else np.array((0.0, 1.0))
                 moved[number] = moved[nearest] + distance * 1.02 * way
     return moved
-
-
-def front_chart(
-    rows: Sequence[tuple[int, float, float]],
-    placed: tuple[int, float],
-    label: str,
-    text: Callable[[float], str],
-    high: float,
-) -> bytes:
-    """Return values against the number of sensors as PNG.
-
-    Parameters
-    ----------
-    rows : sequence of (int, float, float)
-        Number of sensors, value of the best placement found for it, and the largest amount by which the value of
-        another placement could be larger; ``placed`` has the first two of the placement itself.
-    label, text, high
-        Label of the axis of values, function that returns a value as text, and upper end of the axis.
-    """
-    counts, values, more = zip(*rows, strict=True)
-    figure, (axes,) = new_figure(*CHART_SIZE, dpi=DPI)
-    style: Style = {"color": SEEN_COLOURS[2], "ecolor": SOFT_INK, "capsize": 4, "markersize": 8}
-    axes.errorbar(counts, values, yerr=np.array([np.zeros(len(more)), more]), marker="o", linewidth=1.6, **style)
-    for place in zip(counts, values, strict=True) if len(counts) <= MOST_LABELLED else ():
-        about: Style = {"xytext": (0, -18), "textcoords": "offset points", "ha": "center", "size": 10}
-        axes.annotate(text(place[1]), place, **about)
-    ring: Style = {"markersize": 17, "mfc": "none", "mec": INK, "mew": 1.8, "linestyle": "none"}
-    axes.plot(*placed, marker="o", label="this placement", **ring)
-    style_axes(axes, "number of sensors", label, size=11)
-    axes.set_xticks(counts)
-    low = min(values)
-    axes.set_ylim(low - max(0.04 * high, 0.2 * (high - low)), high + max(0.01 * high, 0.06 * (high - low)))
-    axes.margins(x=0.08)
-    axes.legend(frameon=False, loc="lower right", fontsize=10)
-    return as_png(figure)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
+from collections.abc import Generator, Iterator, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -53,7 +53,7 @@ from .blocks import (
     make_sections,
 )
 from .evidence import Evidence, load_evidence
-from .figures import blind_spot_map, front_chart
+from .figures import blind_spot_map
 from .pdf import save_report
 from .wording import (
     date,
@@ -421,41 +421,33 @@ def _weighted_share(evidence: Evidence) -> float:
 
 
 def _front(evidence: Evidence) -> Iterator[Block]:
-    """Yield the chart and the table of the best placements by number of sensors."""
+    """Yield the table of the best placements by number of sensors."""
     record, returns, budget = evidence.record, evidence.record.returns, evidence.record.request.goal.budget
-    text: Callable[[float], str] = (lambda value: percent(value / 100)) if returns is None else returns_text
     if returns is None:
+        weighted = ", by its weights" if np.ptp(evidence.site.problem.weights) > 0 else ""
+        measured, head = f"see these shares of the road{weighted}.", "Seen"
         rows = [
             (
-                *(point.count, 100 * point.coverage, 100 * point.missed, point.price),
+                *(point.count, point.price, percent(point.coverage)),
                 f"at most {points(point.missed)} more" if point.missed else "none sees more",
             )
             for point in record.front
         ]
-        weighted = ", by its weights" if np.ptp(evidence.site.problem.weights) > 0 else ""
-        measured, head, own = f"see these shares of the road{weighted}.", "Seen", 100 * _weighted_share(evidence)
-        label, highest = "road seen, %", 100.0
     else:
+        measured, head = "typically measure these numbers of points on a road user in each revolution.", "Points"
         rows = []
         for point in returns.front:
-            more = (1.0 + point.returns) * (point.gap or 0.0)  # gaps are shares of 1 + returns
             most = f"none has more than {returns_within(point.returns, point.gap)}" if point.gap else "none has more"
             words = "may have more" if point.gap is None else most
-            rows.append((point.count, point.returns, more, point.price, words))
-        measured = "typically measure these numbers of points on a road user in each revolution."
-        head, own, label = "Points", returns.typical, "typical points on a road user"
-        highest = max(value + more for _, value, more, *_ in rows)
+            rows.append((point.count, point.price, returns_text(point.returns), words))
     limit = "" if budget is None else f" The budget of {dollars(budget)} does not limit the choices of this table."
     yield Paragraph(
         "With fewer or more sensors under the same rules, regardless of price, the best choices found by a short "
         f"search {measured}{limit}"
     )
-    chart = front_chart([row[:3] for row in rows], (len(record.sensors), own), label, text, highest)
-    what = f"{label[:1].upper()}{label[1:].removesuffix(', %')} by number of sensors"
-    yield Picture(chart, f"{what}; a line above a point extends to what no choice can exceed, where that is proven.")
     yield Table(
         ("Sensors", "Price installed, $" if record.installed else "Price, $", head, "Other choices"),
-        tuple((str(count), f"{price:,.0f}", text(value), words) for count, value, _, price, words in rows),
+        tuple((str(count), f"{price:,.0f}", value, words) for count, price, value, words in rows),
         frozenset({0, 1, 2}),
     )
 
