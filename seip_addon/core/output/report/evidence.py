@@ -16,7 +16,7 @@ from ...base.errors import SeipError
 from ...geometry.geo_reference import GeoReference
 from ..results.file_names import (
     POSE_ERROR_PICTURES,
-    TRAFFIC_PICTURES,
+    TRAFFIC_PICTURE,
     VERIFICATION_FILE,
     VERIFICATION_FOLDER,
     VERIFICATION_PICTURE,
@@ -99,7 +99,7 @@ def load_evidence(folder: Path) -> Evidence:
         raise SeipError(f"{folder} holds files of different placements: place the sensors again")
     names = list(PICTURES)
     names += POSE_ERROR_PICTURES if record.request.goal.scenarios.errs else ()
-    names += TRAFFIC_PICTURES if record.request.goal.scenarios.kind == "traffic" else ()
+    names += [TRAFFIC_PICTURE] if record.request.goal.scenarios.kind == "traffic" else []
     pictures = {name: _picture(folder / name) for name in names if (folder / name).is_file()}
     verification = _verification(folder / VERIFICATION_FOLDER, record)
     if verification is not None:

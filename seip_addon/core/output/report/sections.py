@@ -24,7 +24,7 @@ from ...choosing.placement.returns_summary import (
 from ...site.candidates import PAPER_TYPES
 from ..pictures.drawing import percent
 from ..results.answer import Costs, costs_of, sentence
-from ..results.file_names import POSE_ERROR_PICTURES, TRAFFIC_PICTURES
+from ..results.file_names import POSE_ERROR_PICTURES, TRAFFIC_PICTURE
 from ..results.geographic_files import LOCATED_FILES
 from ..results.placement_record import RecordedSensor, relevant_warnings
 from ..results.verification_record import (
@@ -78,7 +78,6 @@ CAPTIONS = {
     "spread.png": "Coverage over draws of pose errors that were not used for choosing.",
     "blame.png": "What each sensor's errors, and each kind of error, cost on average.",
     "time_seen.png": "For which share of the time each part of the road is seen in traffic.",
-    "traffic.png": "The empty road and the road in traffic.",
 }
 COST_SOURCES = (
     "Installation costs: Florida DOT in the ITS Costs Database of the US DOT (2004) for posts, arms and power; AASHTO, "
@@ -484,7 +483,7 @@ def _losses(evidence: Evidence) -> Iterator[Block]:
             errors.append("Points on road users have an allowance for vehicles that block the view on average.")
     if errors:
         yield Bullets(tuple(errors))
-    for name in (*POSE_ERROR_PICTURES, *TRAFFIC_PICTURES):
+    for name in (*POSE_ERROR_PICTURES, TRAFFIC_PICTURE):
         if name in evidence.pictures:
             yield Picture(evidence.pictures[name], CAPTIONS[name])
 
