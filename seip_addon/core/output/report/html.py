@@ -17,14 +17,14 @@ _DIRECTIONS = re.compile("[\u202a-\u202e\u2066-\u2069]")
 STYLE = """
 body { font: 16px/1.5 system-ui, sans-serif; color: #1d2b36; max-width: 60em; margin: 2em auto; padding: 0 1em; }
 h1 { font-size: 1.9em; line-height: 1.2; margin: 0 0 .2em; overflow-wrap: anywhere; }
-h2 { font-size: 1.3em; margin: 2.2em 0 .6em; padding-top: .6em; border-top: 2px solid #1d2b36; break-after: avoid; }
-h3 { font-size: 1.05em; margin: 0 0 .5em; overflow-wrap: anywhere; break-after: avoid; }
+h2 { font-size: 1.3em; margin: 2.2em 0 .6em; padding-top: .6em; border-top: 2px solid #1d2b36; }
+h3 { font-size: 1.05em; margin: 0 0 .5em; overflow-wrap: anywhere; }
 .subtitle { color: #5d6b76; font-size: 1.1em; margin: 0 0 1.2em; }
-figure { margin: 1em 0; break-inside: avoid; }
+figure { margin: 1em 0; }
 img { display: block; max-width: 100%; border: 1px solid #c9d1d7; box-sizing: border-box; }
 figure > img { max-height: 60em; margin: 0 auto; }
 figcaption { color: #5d6b76; font-size: .9em; margin-top: .3em; }
-.card { border: 1px solid #c9d1d7; border-radius: 4px; padding: 1em; margin: 1em 0; break-inside: avoid; }
+.card { border: 1px solid #c9d1d7; border-radius: 4px; padding: 1em; margin: 1em 0; }
 dl { display: grid; grid-template-columns: minmax(6em, max-content) 1fr; gap: .25em 1.2em; margin: .6em 0; }
 dt { color: #5d6b76; }
 dd { margin: 0; overflow-wrap: anywhere; font-variant-numeric: tabular-nums; }
@@ -36,23 +36,12 @@ th { border-bottom-color: #1d2b36; }
 td { overflow-wrap: break-word; }
 .number { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap; }
 th.number { white-space: normal; }
-tr { break-inside: avoid; }
-thead { display: table-header-group; }
-@page { size: A4; margin: 18mm 16mm; }
 @media (max-width: 30em) {
   body { margin: 1em auto; }
   dl { grid-template-columns: 1fr; gap: 0; }
   dd { margin-bottom: .5em; }
   .card { padding: .7em; }
   th, td { padding-right: .6em; }
-}
-@media print {
-  body { font-size: 9.5pt; margin: 0; max-width: none; padding: 0; }
-  figure > img { max-height: 14cm; }
-  figure.tall > img { max-height: 21cm; }
-  dl { break-inside: avoid; }
-  header figure > img { max-height: 9.5cm; }
-  section:first-of-type { break-before: page; }
 }
 """
 
@@ -106,9 +95,8 @@ def _block(block: Block) -> str:
     elif isinstance(block, Card):
         html = f'<div class="card">\n<h3>{_shown(block.title)}</h3>\n{_blocks(block.blocks)}\n</div>'
     elif isinstance(block, Picture):
-        kind = ' class="tall"' if block.tall else ""
         caption = f"<figcaption>{_shown(block.caption)}</figcaption>"
-        html = f"<figure{kind}>{_image(block.png, block.caption)}{caption}</figure>"
+        html = f"<figure>{_image(block.png, block.caption)}{caption}</figure>"
     else:
         inner = "\n".join(_row(block, row, "td") for row in block.rows)
         head = _row(block, block.head, "th")
