@@ -47,36 +47,35 @@ th.number { white-space: normal; }
 
 
 def as_html(report: Report) -> str:
-    """Return the page."""
+    """Return the page, which loads nothing."""
     sections = "\n".join(
         f"<section>\n<h2>{_shown(section.title)}</h2>\n{_blocks(section.blocks)}\n</section>"
         for section in report.sections
     )
-    header = f'<h1>{_shown(report.title)}</h1>\n<p class="subtitle">{_shown(report.subtitle)}</p>'
-    return page(report.title, f"<header>\n{header}\n{_blocks(report.first)}\n</header>\n{sections}")
-
-
-def _shown(text: str) -> str:
-    """Return a text for a page, without marks by which a name would reverse the order of what follows it."""
-    return escape(_DIRECTIONS.sub("", text))
-
-
-def page(title: str, body: str, style: str = "") -> str:
-    """Return a page that loads nothing, with the style of reports and more."""
     return f"""<!DOCTYPE html>
 <html lang="en">
 <head>
 <meta charset="utf-8">
 <meta http-equiv="Content-Security-Policy" content="{escape(POLICY)}">
 <meta name="viewport" content="width=device-width, initial-scale=1">
-<title>{_shown(title)}</title>
-<style>{STYLE}{style}</style>
+<title>{_shown(report.title)}</title>
+<style>{STYLE}</style>
 </head>
 <body>
-{body}
+<header>
+<h1>{_shown(report.title)}</h1>
+<p class="subtitle">{_shown(report.subtitle)}</p>
+{_blocks(report.first)}
+</header>
+{sections}
 </body>
 </html>
 """
+
+
+def _shown(text: str) -> str:
+    """Return a text for a page, without marks by which a name would reverse the order of what follows it."""
+    return escape(_DIRECTIONS.sub("", text))
 
 
 def _blocks(blocks: Iterable[Block]) -> str:

@@ -40,7 +40,7 @@ from ..results.verification_record import (
     signed_points,
     vehicles,
 )
-from .blind_spots import blind_spots, seen_places, seen_streets
+from .blind_spots import blind_spot_map, blind_spots, seen_places, seen_streets
 from .blocks import (
     Block,
     Bullets,
@@ -53,7 +53,6 @@ from .blocks import (
     make_sections,
 )
 from .evidence import Evidence, load_evidence
-from .figures import blind_spot_map
 from .pdf import save_report
 from .wording import (
     date,
@@ -347,7 +346,9 @@ def _blind_spots(evidence: Evidence) -> Iterator[Block]:
     if evidence.record.returns is not None:
         yield Paragraph(SURFACE_SEEN)
     yield Picture(
-        blind_spot_map(evidence, shown),
+        blind_spot_map(
+            evidence.site.targets, evidence.seen_by, shown, evidence.sensors, evidence.record.site.attribution
+        ),
         "Orange is not seen, light blue seen by one sensor, dark blue by two or more. Triangles are sensors, numbers "
         "the blind spots of the table.",
     )
