@@ -1,5 +1,6 @@
 """Charts of coverage under pose errors and in traffic."""
 
+import math
 import os
 from collections.abc import Sequence
 from pathlib import Path
@@ -22,7 +23,6 @@ from seip_addon.core.output.pictures.chart_style import (
     DASHED,
     add_legend,
     colour,
-    interval_ends,
     limits_around,
     mark,
     new_figure,
@@ -147,7 +147,8 @@ def _outcome(comparisons: Sequence[Comparison]) -> str:
 def _interval(
     axes: Axes, estimate: IntervalEstimate, height: float, shown: str, marker: str, label: str | None
 ) -> None:
-    axes.plot(interval_ends(estimate), [height, height], color=shown, linewidth=2.4)
+    low, high = (end if math.isfinite(end) else estimate.value for end in (estimate.low, estimate.high))
+    axes.plot([low, high], [height, height], color=shown, linewidth=2.4)
     axes.plot(estimate.value, height, marker=marker, color=shown, linestyle="none", label=label)
 
 
