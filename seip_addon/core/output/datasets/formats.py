@@ -21,9 +21,8 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from ...base.arrays import Float
-from ...base.errors import SeipError
 from ...geometry.orientation import quaternion_of
-from .sample import Sample, TrafficRun, cloud, shortest
+from .sample import MERGED, Sample, cloud, shortest
 
 Files = dict[str, Callable[[], bytes]]
 """Functions that return the bytes of each file, by its path in the folder of a dataset."""
@@ -71,7 +70,6 @@ CALIBRATION = "".join(
 )
 FULLY_VISIBLE, PARTLY_VISIBLE = 0.8, 0.4
 """Visibility from which an object counts as fully visible (0) and as partly occluded (1) and not largely (2)."""
-MERGED = "merged"
 IDENTITY = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)  # viewpoint in the origin
 POINT_TYPE = np.dtype([("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("intensity", "<f4")])
 
@@ -90,8 +88,6 @@ class Format:
     index_files : callable
         From the dataset's folder and the names of the samples by split to the bytes of the files of the dataset as a
         whole, by path; called when all samples are written.
-    notes : callable
-        From a `TrafficRun` to sentences for its users; raises `SeipError` if the format cannot represent it.
     """
 
     key: str
@@ -99,7 +95,6 @@ class Format:
     classes: Mapping[str, str]
     sample_files: Callable[[Sample], Files]
     index_files: Callable[[Path, Splits], Mapping[str, bytes]] = lambda _folder, _splits: {}
-    notes: Callable[[TrafficRun], tuple[str, ...]] = lambda _run: ()
 
 
 def label_lines(sample: Sample, xyz: Float) -> str:
@@ -308,13 +303,6 @@ def encode(points: NDArray[Any], viewpoint: Sequence[float] = IDENTITY) -> bytes
     return ("\n".join(lines) + "\n").encode() + points.tobytes()
 
 
-def _pcd_notes(run: TrafficRun) -> tuple[str, ...]:
-    """Note nothing, but see that no sensor is called as the merged cloud is."""
-    if any(sensor.label.lower() == MERGED for sensor in run.sensors):
-        raise SeipError(f"a sensor is called '{MERGED}', as is the folder of the merged cloud; rename its empty")
-    return ()
-
-
 def kitti_results(boxes: Float, categories: Sequence[str], score: Float) -> str:
     """Return a line of KITTI's results for each detection: a label, and the score (0 to 1).
 
@@ -343,7 +331,7 @@ FORMATS: dict[str, Format] = {
             *("kitti", "KITTI's object detection format", KITTI_CLASSES, _kitti_files),
             lambda _folder, splits: image_sets(splits),
         ),
-        Format("pcd", "PCD clouds", {}, _pcd_files, notes=_pcd_notes),
+        Format("pcd", "PCD clouds", {}, _pcd_files),
     )
 }
 """Formats of datasets by the names that a user types."""
