@@ -5,7 +5,6 @@ from __future__ import annotations
 import importlib
 import json
 import math
-import re
 import sys
 from collections.abc import Generator, Iterator
 from contextlib import contextmanager
@@ -38,8 +37,6 @@ FIELD_OF_VIEW = math.radians(35.0)  # across the picture
 ROOM = 1.07  # around the region and the sensors
 SENSOR_ROOM = 0.5  # metres round a sensor that its own body and bracket take up
 UNSEEN_TYPES = {"LIGHT", "CAMERA", "SPEAKER", "LIGHT_PROBE"}
-SAMPLE = re.compile(r"Sample (\d+)/")
-"""Words in which Cycles reports its progress."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,7 +109,7 @@ def render_elsewhere(
     Yields
     ------
     Progress
-        Samples rendered; closing the generator ends the other Blender.
+        Ten times a second; closing the generator ends the other Blender.
 
     Raises
     ------
@@ -124,7 +121,7 @@ def render_elsewhere(
     request = {"path": sys.path, "blend": str(blend), "scene": scene, "raw": str(raw), "answer": str(answer)}
     job.write_text(json.dumps(request | {"shot": shot.as_json()}))
     temporary = dict.fromkeys(("TMPDIR", "TEMP", "TMP"), str(raw.parent))  # which Blender leaves when it is ended
-    yield from run_logged(_command(job), log, _samples, environment=temporary)
+    yield from run_logged(_command(job), log, lambda _: Progress(0, 0, "rendering"), environment=temporary)
     try:
         number, hidden = json.loads(answer.read_text())
     except OSError as error:
@@ -138,15 +135,8 @@ def _command(job: Path) -> list[str]:
     """Return the command that runs a job of `render_job` in a Blender without a window, or on the bpy module."""
     script = str(Path(__file__).with_name("render_job.py"))
     if bpy.app.binary_path:
-        tell = ["--log", "*render*", "--log-level", "info"] if bpy.app.version >= (5, 0) else []  # others tell unasked
-        return [bpy.app.binary_path, "-b", "--factory-startup", *tell, "-P", script, "--", str(job)]
+        return [bpy.app.binary_path, "-b", "--factory-startup", "-P", script, "--", str(job)]
     return [sys.executable, script, "--", str(job)]
-
-
-def _samples(output: str) -> Progress:
-    """Return the number of samples done, from all that Cycles has printed."""
-    counts = SAMPLE.findall(output)
-    return Progress(int(counts[-1]) if counts else 0, sample_count(), "rendering")
 
 
 def take(shot: Shot, scene: bpy.types.Scene, raw: Path) -> tuple[int, Boolean]:
@@ -237,7 +227,7 @@ def _set_up(stage: bpy.types.Scene) -> None:
     render.film_transparent = True
     stage.view_settings.view_transform = "Standard"
     stage.cycles.device = "CPU"
-    stage.cycles.samples = sample_count()
+    stage.cycles.samples = min(SAMPLES, DENOISED_SAMPLES) if has_denoiser() else SAMPLES
     stage.cycles.seed = 0
     stage.cycles.use_adaptive_sampling = False
     stage.cycles.use_denoising = has_denoiser()
@@ -253,11 +243,6 @@ def has_denoiser() -> bool:
     except ImportError:
         return False
     return bool(getattr(cycles, "with_openimagedenoise", False))
-
-
-def sample_count() -> int:
-    """Return the number of samples of each pixel."""
-    return min(SAMPLES, DENOISED_SAMPLES) if has_denoiser() else SAMPLES
 
 
 def _hidden(stage: bpy.types.Scene, points: Float, viewpoint: Viewpoint) -> Boolean:
