@@ -19,8 +19,7 @@ from ..core.world.openstreetmap.site import is_extract
 from ..core.world.streetscape.description import DEFAULT_RADIUS
 from ..core.world.streetscape.site_file import DESCRIPTION_SUFFIX
 from ..scene import contract
-from ..scene.build import build_scene, remove_site
-from ..scene.startup import remove_startup_objects
+from ..scene.build import build_scene, remove_site, remove_startup_objects
 from ..scene.views import frame_site
 from . import overlays, preferences, scene_status, sensors, traffic
 from .layout import (

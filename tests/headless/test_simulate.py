@@ -2,7 +2,6 @@
 
 import json
 import math
-import os
 import subprocess
 import sys
 from pathlib import Path
@@ -16,7 +15,7 @@ import pytest
 from seip_addon.core.base.errors import SeipError
 from seip_addon.core.sensing.scans.run_folder import load_frames
 from seip_addon.core.sensing.traffic.trajectories import RoadUser, Trajectories
-from seip_addon.core.storage.files import lock_folder
+from seip_addon.core.storage.files import locked_folder
 from seip_addon.scene import contract
 from seip_addon.scene.blend_file import save_blend
 from seip_addon.scene.traffic import animate
@@ -167,7 +166,6 @@ def test_a_scene_without_sensors_or_traffic_has_its_sentence(folder):
 
 def test_two_runs_into_one_folder_have_a_sentence(folder):
     (folder / "shared").mkdir()
-    held = lock_folder(folder / "shared")
-    with pytest.raises(SeipError, match=f"another run is writing to {folder / 'shared'}: wait until it has ended"):
+    waits = f"another run is writing to {folder / 'shared'}: wait until it has ended"
+    with locked_folder(folder / "shared"), pytest.raises(SeipError, match=waits):
         simulate.main(arguments(folder, "shared"))
-    os.close(held)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import signal
 import subprocess
 import sys
@@ -11,11 +10,11 @@ from pathlib import Path
 import pytest
 
 from seip_addon.core.base.errors import SeipError
-from seip_addon.core.storage.files import lock_folder, locked_folder, save_json, whole_file
+from seip_addon.core.storage.files import locked_folder, save_json, whole_file
 
 ROOT = Path(__file__).resolve().parents[3]
 HOLD = "import sys, time; from pathlib import Path; from seip_addon.core.storage.files import *; "
-LOCK = HOLD + "lock_folder(Path(sys.argv[1])); print('held', flush=True); time.sleep(60)"
+LOCK = HOLD + "part = locked_folder(Path(sys.argv[1])); part.__enter__(); print('held', flush=True); time.sleep(60)"
 WRITE = HOLD + "part = whole_file(Path(sys.argv[1]) / 'a.json'); print(part.__enter__(), flush=True); time.sleep(60)"
 
 
@@ -40,12 +39,15 @@ def other():
 def test_a_folder_that_another_run_writes_to_is_refused_until_that_ends_however_it_ends(tmp_path, other):
     process, said = other(LOCK, tmp_path)
     assert said == "held"
-    with pytest.raises(SeipError, match=r"another run is writing to .*: wait until it has ended"):
-        lock_folder(tmp_path)
+    with (
+        pytest.raises(SeipError, match=r"another run is writing to .*: wait until it has ended"),
+        locked_folder(tmp_path),
+    ):
+        pass
     process.send_signal(signal.SIGKILL)
     process.wait()
-    os.close(lock_folder(tmp_path))
-    assert list(tmp_path.iterdir()) == []
+    with locked_folder(tmp_path):
+        assert list(tmp_path.iterdir()) == []
 
 
 def test_the_next_run_removes_what_a_killed_one_left_and_nothing_else(tmp_path, other):
