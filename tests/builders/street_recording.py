@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from seip_addon.core.sensing.lidar.beams import BeamPattern
-from seip_addon.core.sensing.recordings.sweep import Sweep
+from seip_addon.core.sensing.recordings.sweep_files import Sweep
 
 CANYON = ((0, 35.0), (0, -25.0), (1, 12.0), (1, -28.0))
 """Walls of a square: axis and its coordinate, metres from the sensor."""

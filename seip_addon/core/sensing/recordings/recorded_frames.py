@@ -26,7 +26,7 @@ from .comparison import MOST_VEHICLE_HEIGHT, NEARER, RayComparison, compare_rays
 from .ground import estimated_ground, pose_above_ground
 from .recording import Recording, SensorRecording, paired
 from .registration import register
-from .sweep import Sweep
+from .sweep_files import Sweep
 
 ROAD_REFLECTIVITY = 0.17
 """Reflectivity of the road near the sensor, by which intensities are scaled: that of dry asphalt."""

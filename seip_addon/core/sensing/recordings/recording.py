@@ -14,8 +14,7 @@ from ...base.arrays import Float, Integer
 from ...base.errors import SeipError
 from ...base.limits import FRAMES, ROTATION_RATE, TIME
 from ...storage.files import natural_order, read_small
-from .sweep import Sweep
-from .sweep_files import read_sweep, sweep_suffix
+from .sweep_files import Sweep, read_sweep, sweep_suffix
 
 MERGED = "merged"  # folder of the clouds of all sensors together, in datasets of `seip simulate --format pcd`
 TIMES_FILE = "timestamps.txt"

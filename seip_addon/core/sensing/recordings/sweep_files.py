@@ -1,8 +1,9 @@
-"""Readers of sweeps: PCD, KITTI's binary files, and npz."""
+"""Sweeps, and their readers: PCD, KITTI's binary files, and npz."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -11,10 +12,11 @@ from numpy.typing import NDArray
 
 from ...base.arrays import Float
 from ...base.errors import SeipError
+from ...base.limits import MAP_NUMBER, SENSOR_COORDINATE, SWEEP_POINTS, TIME
+from ...geometry.orientation import rotated
 from ...storage.array_file import read_npz
 from ...storage.files import read_small
 from .pcd_file import read_pcd
-from .sweep import Sweep, sweep_of
 
 MAX_BYTES = 1 << 30  # largest size of the file of a sweep
 _BIN_COLUMNS = (4, 5, 6)  # of a .bin: KITTI's four, and a ring and a time
@@ -27,6 +29,31 @@ _NAMES = {
     "time": ("time",),
 }
 """Names of each column in files, the preferred one first."""
+
+
+@dataclass(frozen=True, eq=False)
+class Sweep:
+    """Returns of one sensor in one revolution.
+
+    Parameters
+    ----------
+    time : float, seconds, optional
+        Time of the sweep, if known.
+    points : (n, 3) float32, metres
+        Finite points in the sensor's axes (x forward, y left, z up), none of them (0, 0, 0).
+    intensity : (n,) float32, optional
+        Intensity in the unit of the file.
+    viewpoint : (4, 4) float64, optional
+        Pose of the sensor in the axes of the file, if the file states one that is not the identity.
+    """
+
+    time: float | None
+    points: NDArray[np.float32]
+    intensity: NDArray[np.float32] | None = None
+    viewpoint: Float | None = None
+
+    def __len__(self) -> int:
+        return len(self.points)
 
 
 def sweep_suffix(path: Path) -> str:
@@ -55,7 +82,37 @@ def read_sweep(path: Path) -> Sweep:
         raise SeipError(f"{path.name} is not a text file; {_CURE}") from error
     except ValueError as error:
         raise SeipError(f"{path.name} is damaged or not a sweep ({str(error)[:200]}); {_CURE}") from error
-    return sweep_of(path.name, columns, viewpoint)
+    return _sweep_of(path.name, columns, viewpoint)
+
+
+def _sweep_of(file: str, columns: Columns, viewpoint: Float | None) -> Sweep:
+    """Return the sweep of a file without its missing returns, which are not finite or (0, 0, 0).
+
+    Columns are ``x``, ``y``, ``z`` in the axes of the file, and ``intensity`` and ``time`` if they are known. With a
+    viewpoint, points are transformed into the sensor's axes.
+    """
+    SWEEP_POINTS.require(len(columns["x"]), file, "number of points", "export one revolution to a file")
+    points = np.column_stack([columns[axis].astype(np.float64) for axis in "xyz"])
+    kept = np.isfinite(points).all(axis=1) & points.any(axis=1)
+    points = points[kept]
+    if viewpoint is not None:
+        with np.errstate(over="ignore", invalid="ignore"):  # what overflows is refused below
+            points = rotated(points - viewpoint[:3, 3], viewpoint[:3, :3].T)
+    if not SENSOR_COORDINATE.allow(points):
+        raise SeipError(
+            f"{file} has points more than 10 km from the sensor, which looks like map coordinates: export points "
+            "in the sensor's axes"
+        )
+    chosen = {name: column[kept] for name, column in columns.items() if name not in {"x", "y", "z"}}
+    for name, limits in (("intensity", MAP_NUMBER), ("time", TIME)):
+        if name in chosen:
+            limits.require(chosen[name], file, name)
+    return Sweep(
+        time=float(chosen["time"].min()) if len(chosen.get("time", ())) else None,
+        points=points.astype(np.float32),
+        intensity=chosen["intensity"].astype(np.float32) if "intensity" in chosen else None,
+        viewpoint=viewpoint,
+    )
 
 
 def _pcd(path: Path) -> tuple[Columns, Float | None]:

@@ -20,7 +20,7 @@ from seip_addon.core.sensing.lidar.catalogue import load_catalogue
 from seip_addon.core.sensing.lidar.range_equation import RangeEquation
 from seip_addon.core.sensing.scans.sensor import level_orientation
 from seip_addon.core.sensing.scenarios.pose_errors import PoseErrors
-from seip_addon.core.sensing.scenarios.visibility_under_errors import visibility_under_errors
+from seip_addon.core.sensing.scenarios.scenario_visibility import visibility_under_errors
 from seip_addon.core.sensing.visibility.grid import (
     FILE,
     VisibilitySettings,
