@@ -29,7 +29,7 @@ class MemoryRecord:
 def memory_record(name, clouds, rate=10.0, intensities=None):
     """Return the record of clouds (n, 3) in the sensor's axes."""
     intensities = intensities or [None] * len(clouds)
-    sweeps = tuple(Sweep(None, cloud, intensity) for cloud, intensity in zip(clouds, intensities, strict=True))
+    sweeps = tuple(Sweep(cloud, intensity) for cloud, intensity in zip(clouds, intensities, strict=True))
     return MemoryRecord(name, sweeps, np.arange(len(clouds)) / rate)
 
 

@@ -1,8 +1,7 @@
 """A detector says what it has been trained on, and what speaks against using it beyond."""
 
-from headless.detection.detector import Detector, TrainingRecord
+from headless.detection.detector import Detector, TrainingRecord, suitability_warnings
 from headless.detection.settings import NetworkSettings
-from headless.detection.suitability import suitability_warnings
 
 NETWORK = NetworkSettings(width=8, blocks=(0, 0, 0), most_points=2)
 KNOWN = TrainingRecord(("type1", "type2"), ("Junction",))

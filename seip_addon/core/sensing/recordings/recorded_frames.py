@@ -136,7 +136,7 @@ class RecordedFrames:
             parts.append({"points": points, "intensity": intensity, "foreground": foreground, "sensor": sensors})
         merged = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
         count = len(merged["points"])
-        boxes = labels or BoxLabels(np.zeros((0, 7)), np.zeros(0, dtype=np.str_), {})
+        boxes = labels or BoxLabels(np.zeros((0, 7)), np.zeros(0, dtype=np.str_))
         instance = _instances(merged["points"], boxes.boxes)
         return Frame(
             time=self.time(number),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -55,7 +55,7 @@ class SensorRecording:
         SeipError
             Its file is damaged.
         """
-        return replace(read_sweep(self.paths[number]), time=float(self.times[number]))
+        return read_sweep(self.paths[number])
 
 
 @dataclass(frozen=True, eq=False)

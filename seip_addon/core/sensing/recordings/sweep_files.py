@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ...base.arrays import Float
 from ...base.errors import SeipError
-from ...base.limits import MAP_NUMBER, SENSOR_COORDINATE, SWEEP_POINTS, TIME
+from ...base.limits import MAP_NUMBER, SENSOR_COORDINATE, SWEEP_POINTS
 from ...geometry.orientation import rotated
 from ...storage.array_file import read_npz
 from ...storage.files import read_small
@@ -24,11 +24,8 @@ _BIN_COLUMNS = (4, 5, 6)  # of a .bin: KITTI's four, and a ring and a time
 Columns = dict[str, NDArray[Any]]
 
 _CURE = "export the sweep again"
-_NAMES = {
-    "intensity": ("intensity", "i", "reflectivity"),
-    "time": ("time",),
-}
-"""Names of each column in files, the preferred one first."""
+_INTENSITY = ("intensity", "i", "reflectivity")
+"""Names of the column of intensities in files, the preferred one first."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,8 +34,6 @@ class Sweep:
 
     Parameters
     ----------
-    time : float, seconds, optional
-        Time of the sweep, if known.
     points : (n, 3) float32, metres
         Finite points in the sensor's axes (x forward, y left, z up), none of them (0, 0, 0).
     intensity : (n,) float32, optional
@@ -47,7 +42,6 @@ class Sweep:
         Pose of the sensor in the axes of the file, if the file states one that is not the identity.
     """
 
-    time: float | None
     points: NDArray[np.float32]
     intensity: NDArray[np.float32] | None = None
     viewpoint: Float | None = None
@@ -66,7 +60,7 @@ def read_sweep(path: Path) -> Sweep:
     """Read a sweep in the format of the file's suffix.
 
     ``.bin`` holds four to six float32 for each point, of which x, y, z and intensity are read (KITTI). Point clouds
-    with named columns need ``x``, ``y`` and ``z``; the names of intensity are those of `_NAMES`.
+    with named columns need ``x``, ``y`` and ``z``; the names of intensity are those of `_INTENSITY`.
 
     Raises
     ------
@@ -88,8 +82,8 @@ def read_sweep(path: Path) -> Sweep:
 def _sweep_of(file: str, columns: Columns, viewpoint: Float | None) -> Sweep:
     """Return the sweep of a file without its missing returns, which are not finite or (0, 0, 0).
 
-    Columns are ``x``, ``y``, ``z`` in the axes of the file, and ``intensity`` and ``time`` if they are known. With a
-    viewpoint, points are transformed into the sensor's axes.
+    Columns are ``x``, ``y``, ``z`` in the axes of the file, and ``intensity`` if it is known. With a viewpoint, points
+    are transformed into the sensor's axes.
     """
     SWEEP_POINTS.require(len(columns["x"]), file, "number of points", "export one revolution to a file")
     points = np.column_stack([columns[axis].astype(np.float64) for axis in "xyz"])
@@ -103,16 +97,11 @@ def _sweep_of(file: str, columns: Columns, viewpoint: Float | None) -> Sweep:
             f"{file} has points more than 10 km from the sensor, which looks like map coordinates: export points "
             "in the sensor's axes"
         )
-    chosen = {name: column[kept] for name, column in columns.items() if name not in {"x", "y", "z"}}
-    for name, limits in (("intensity", MAP_NUMBER), ("time", TIME)):
-        if name in chosen:
-            limits.require(chosen[name], file, name)
-    return Sweep(
-        time=float(chosen["time"].min()) if len(chosen.get("time", ())) else None,
-        points=points.astype(np.float32),
-        intensity=chosen["intensity"].astype(np.float32) if "intensity" in chosen else None,
-        viewpoint=viewpoint,
-    )
+    intensity = columns["intensity"][kept] if "intensity" in columns else None
+    if intensity is not None:
+        MAP_NUMBER.require(intensity, file, "intensity")
+        intensity = intensity.astype(np.float32)
+    return Sweep(points.astype(np.float32), intensity, viewpoint)
 
 
 def _pcd(path: Path) -> tuple[Columns, Float | None]:
@@ -132,9 +121,8 @@ def _found(path: Path, names: Sequence[str]) -> dict[str, str]:
     if missing:
         raise SeipError(f"{path.name} has no {' and no '.join(missing)}: name the columns of the coordinates x, y, z")
     found = {axis: axis for axis in "xyz"}
-    for column, known in _NAMES.items():
-        if name := next((name for name in known if name in names), None):
-            found[column] = name
+    if name := next((name for name in _INTENSITY if name in names), None):
+        found["intensity"] = name
     return found
 
 
@@ -160,11 +148,9 @@ def _npz(path: Path) -> tuple[Columns, None]:
         points = arrays.pop("points")
         if points.ndim != 2 or not 3 <= points.shape[1] <= 6:
             raise ValueError(f"points has the shape {points.shape}, not (n, 3 to 6)")
-        arrays |= dict(zip(("x", "y", "z", "intensity", "ring", "time"), points.T, strict=False))
+        arrays |= dict(zip(("x", "y", "z", "intensity"), points.T, strict=False))
     columns = {name: arrays[found] for name, found in _found(path, list(arrays)).items()}
     count = columns["x"].size
-    if columns.get("time", columns["x"]).shape == ():  # of the whole sweep
-        columns["time"] = np.repeat(columns["time"], count)
     for name, column in columns.items():
         if column.dtype.kind not in "fiu" or column.shape != (count,):
             raise ValueError(f"{name} is not an array of numbers, one for each point")
