@@ -1,6 +1,6 @@
 """Recordings of spinning LiDARs, simulated without the project's scanner: plain formulas for rays and surfaces."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -23,7 +23,7 @@ class MemoryRecord:
         return len(self.sweeps)
 
     def sweep(self, number):
-        return replace(self.sweeps[number], time=float(self.times[number]))
+        return self.sweeps[number]
 
 
 def memory_record(name, clouds, rate=10.0, intensities=None):
