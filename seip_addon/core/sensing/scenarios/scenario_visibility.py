@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,6 +15,7 @@ from ..visibility.ray_casting import engine_name, make_ray_caster
 from ..visibility.surroundings import Surroundings
 from ..visibility.visibility_model import VisibilityModel
 from .pose_errors import PoseErrors, draw_errors, out_of_objects
+from .traffic_instants import TrafficObstacles
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,4 +87,41 @@ def visibility_under_errors(
 
     works = [(draw, pose) for draw in range(draws) for pose in range(len(poses))]
     yield from each_in_threads(compute, works, caster.threads, "computing visibility under pose errors")
+    return ScenarioVisibility(packed, len(site.targets))
+
+
+def visibility_in_traffic(
+    around: Surroundings, poses: Integer, instants: Sequence[TrafficObstacles]
+) -> Generator[Progress, None, ScenarioVisibility]:
+    """Compute visibility from poses at instants of traffic, as with the vehicles in the scene.
+
+    A return from a vehicle on a target, or next to it, sees the target as a return from the road does.
+
+    Parameters
+    ----------
+    poses : (s,) int64
+        Indices among the site's candidates.
+    instants : sequence of TrafficObstacles
+        Bodies of the vehicles present at each of n instants.
+
+    Yields
+    ------
+    Progress
+        Progress after each instant.
+    """
+    site, candidates, engine = around.site, around.site.candidates, engine_name(around.engine)
+    packed = np.zeros((len(instants), len(poses), (len(site.targets) + 7) // 8), dtype=np.uint8)
+
+    def compute(instant: int) -> None:
+        present = instants[instant]
+        caster = make_ray_caster(np.concatenate([site.triangles, present.triangles]), engine)
+        reflectivity = np.concatenate([site.reflectivity, present.reflectivity])
+        model = VisibilityModel(site.targets.xyz, reflectivity, around.sight, caster)
+        for number, pose in enumerate(poses.tolist()):
+            lidar = around.models[str(candidates.sensor[pose])]
+            seen = model.see(lidar, candidates.xyz[pose], candidates.orientation(pose))
+            packed[instant, number] = np.packbits(seen)
+
+    threads = make_ray_caster(site.triangles, engine).threads
+    yield from each_in_threads(compute, range(len(instants)), threads, "computing visibility in traffic")
     return ScenarioVisibility(packed, len(site.targets))
