@@ -25,7 +25,6 @@ from seip_addon.core.base.progress import finish
 from seip_addon.core.programs.sumo_programs import NETWORK_SUFFIX
 from seip_addon.core.site.sources import source_lines
 from seip_addon.core.workflows.site_building import SiteRequest, build_site, save_map
-from seip_addon.core.world.elevation.at_place import TerrainRequest
 from seip_addon.core.world.openstreetmap.map_links import parsed_position
 from seip_addon.core.world.openstreetmap.overpass import OVERPASS, OverpassServer, user_cache
 from seip_addon.scene.blend_file import check_name, new_file, save_blend
@@ -78,7 +77,7 @@ def _asked_site(options: argparse.Namespace) -> SiteRequest:
         level=tuple(options.level),
         site=options.site,
         osm=options.osm,
-        terrain=None if options.terrain is None else TerrainRequest(options.terrain, options.terrain_epsg),
+        terrain=options.terrain,
         service=options.service_roads,
         left_hand=None if options.traffic_keeps is None else options.traffic_keeps == "left",
         overpass=_server(options) if options.at and options.source is None else None,
@@ -154,8 +153,7 @@ def _parser() -> argparse.ArgumentParser:
         help="street or road id on the level to study, where roads cross on several levels",
     )
     parser.add_argument("--site", type=Path, metavar="TOML", help="site description with objects that the map lacks")
-    add_settings(parser, SiteRequest, "osm")
-    add_settings(parser, TerrainRequest, "path", "epsg")
+    add_settings(parser, SiteRequest, "osm", "terrain")
     parser.add_argument(
         "--service-roads", action="store_true", help="treat driveways, aisles and alleys of an extract as streets"
     )

@@ -19,10 +19,9 @@ if not __package__:  # run as a file by `blender -P`
 from headless import runtime
 from headless.detect_recording import add_recording_options, detect_recording, is_recording
 from headless.detection.average_precision import too_few_runs
-from headless.detection.detector import SHIPPED_DETECTOR, Detector, check_device
+from headless.detection.detector import SHIPPED_DETECTOR, Detector, check_device, suitability_warnings
 from headless.detection.detector_evaluation import evaluate_detector
 from headless.detection.recordings import MountedSensors, Simulator, sampled_runs
-from headless.detection.suitability import suitability_warnings
 from headless.detection_results import (
     print_precision,
     remove_detections,

@@ -20,7 +20,7 @@ from headless.charts.birds_eye import draw_birds_eye
 from headless.detection.average_precision import balanced_score, evaluate
 from headless.detection.confidence import Confidence
 from headless.detection.detection_area import DetectionArea
-from headless.detection.detector import Detector
+from headless.detection.detector import Detector, suitability_warnings
 from headless.detection.detector_evaluation import DetectorEvaluation
 from headless.detection.frame_results import Detections, EvaluatedBoxes, FrameResult, frame_result
 from headless.detection.inference import detect
@@ -28,9 +28,8 @@ from headless.detection.matching import Rule
 from headless.detection.pillars import grid_over
 from headless.detection.rules import MAIN_RULE
 from headless.detection.settings import BOTTOM, TOP
-from headless.detection.suitability import suitability_warnings
 from headless.detection.traffic_ground import apart, moved_ground
-from headless.detection.training import deterministic
+from headless.detection.training import make_deterministic
 from headless.detection_results import print_precision, remove_detections, save_charts, save_detections
 from headless.options import real_number
 
@@ -218,11 +217,11 @@ def _detected(
     blocks = _BLOCKS if total >= _BLOCKS * _LEAST_PER_BLOCK else 1
     places = np.array([sensor.mounted.xyz for sensor in frames.sensors])
     results = []
+    make_deterministic(os.cpu_count() or 1)
     for number in range(total):
         yield Progress(number, total, "detecting")
         frame = frames.frame(number, None if labels is None else labels[number])
-        with deterministic(os.cpu_count() or 1):
-            found = _inside(detect(detector, area, frame), frames)
+        found = _inside(detect(detector, area, frame), frames)
         run = f"part {number * blocks // total + 1}" if blocks > 1 else "recording"
         result = frame_result(frame, found, region=frames.region, sensors=places, run=run)
         path = options.output / "frames" / f"{number:06d}.png"

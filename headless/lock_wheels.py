@@ -20,7 +20,7 @@ from headless.set_up import LOCK, SUPPORTED_PYTHONS, UNLOCKED, requirements
 
 from packaging.requirements import Requirement
 
-GROUPS = ("installer", "development", "traffic", "survey", "detection", "second-opinion")
+GROUPS = ("installer", "development", "traffic", "detection", "second-opinion")
 """Groups that `headless.set_up` installs; the group ``readers`` is tried out apart from the rest."""
 
 MAX_GLIBC_MINOR = 36  # of Debian 12, the oldest system that is tried: 2.36

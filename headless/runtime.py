@@ -13,7 +13,7 @@ import stat
 import sys
 import threading
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from types import FrameType
 from typing import NoReturn, TypeVar
@@ -28,7 +28,7 @@ from headless.system_libraries import complaint, missing_libraries
 from seip_addon.core.base.acceptance import Acceptance
 from seip_addon.core.base.errors import SeipError
 from seip_addon.core.base.progress import Progress, finish, progress_line, reporter
-from seip_addon.core.storage import files as storage
+from seip_addon.core.storage.files import locked_folder
 from seip_addon.scene.interrupts import SIGNALS, held_signals
 
 try:
@@ -59,8 +59,8 @@ EXIT_STOPPED = 130  # what a shell reports of a command that was stopped by Ctrl
 SECONDS_BETWEEN_LINES = float(os.environ.get("SEIP_SECONDS_BETWEEN_LINES", "10"))  # of progress, in a log
 SECONDS_BETWEEN_BARS = 0.1  # of progress, in a terminal
 LOG = logging.getLogger("headless")  # progress and warnings of commands and modules; results go through `print_line`
-_LOCKS: dict[Path, int] = {}  # folders that this process has locked, and what holds each lock
-_MADE: list[Path] = []  # folders that this process has made for results
+_FOLDERS = ExitStack()  # locks of the folders of results
+_LOCKED: set[Path] = set()  # these folders
 
 
 def in_blender() -> bool:
@@ -107,10 +107,10 @@ def check_folder(folder: Path) -> None:
     SeipError
         It cannot, or another run does.
     """
-    _MADE.extend(storage.check_folder(folder))
     place = folder.resolve()
-    if place not in _LOCKS:
-        _LOCKS[place] = storage.lock_folder(place)
+    if place not in _LOCKED:
+        _FOLDERS.enter_context(locked_folder(folder))
+        _LOCKED.add(place)
 
 
 @contextmanager
@@ -207,10 +207,8 @@ def refuse_pipes(words: list[str]) -> list[str]:
 
 def _leave_folders() -> None:
     """Unlock the folders of results, and remove those that were made in vain."""
-    while _LOCKS:
-        storage.unlock_folder(*_LOCKS.popitem())
-    storage.remove_empty(_MADE)
-    _MADE.clear()
+    _FOLDERS.close()
+    _LOCKED.clear()
 
 
 def finish_with_bar(steps: Generator[Progress, None, Result]) -> Result:

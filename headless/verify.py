@@ -7,8 +7,8 @@ blender -b --python-exit-code 1 -P headless/verify.py -- out/placed.blend sweeps
 from __future__ import annotations
 
 import argparse
-import math
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 if not __package__:  # run as a file by `blender -P`
@@ -22,18 +22,24 @@ import bpy
 
 from seip_addon.core.base.counts import counted
 from seip_addon.core.base.errors import SeipError
+from seip_addon.core.output.results.verification_record import (
+    VerificationRecord,
+    change_text,
+    cost_text,
+    coverage_text,
+    gain_text,
+    objects,
+    pose_text,
+    vehicles,
+)
 from seip_addon.core.output.results.versions import versions
-from seip_addon.core.sensing.recordings.comparison import VEHICLE
 from seip_addon.core.sensing.recordings.recording import open_recording
-from seip_addon.core.sensing.recordings.verification import Verification
 from seip_addon.core.sensing.visibility.settings import VisibilitySettings
 from seip_addon.core.workflows.survey_settings import SurveySettings
-from seip_addon.core.workflows.verification_record import UNITS_FILE, write_verification
+from seip_addon.core.workflows.verification_record import UNITS_FILE, record_of, write_verification
 from seip_addon.core.workflows.verifying import verify
 from seip_addon.scene.blend_file import save_blend
 from seip_addon.scene.corrections import correct_scene
-
-_LEAST_COST = 0.0005  # share of coverage that is shown as 0.1 points
 
 
 def main(argv: list[str]) -> None:
@@ -55,47 +61,21 @@ def main(argv: list[str]) -> None:
         write_verification(folder, geometry, planned, recording.name, found, made_with)
         runtime.warn(correct_scene(bpy.context.scene, found))
         save_blend(folder / "verified.blend")
-    for line in _lines(found):
+    for line in _lines(record_of(geometry.name, recording.name, found)):
         runtime.print_line(line)
     written = "verified.blend, changes.png, changes.csv, verification.json"
     runtime.print_line(f"written to {folder}/: {written}{f', {UNITS_FILE}' * (folder / UNITS_FILE).exists()}")
 
 
-def _lines(found: Verification) -> list[str]:
-    lines = []
-    for one in found.sensors:
-        gain = one.gain
-        errors = zip(one.shift_m, one.shift_half_width_m, strict=True)
-        east, north, up = (f"{value:+.3f} ± {math.ceil(1000 * half) / 1000:.3f}" for value, half in errors)
-        received = "" if gain is None else f"; gain {gain.value:.2f} ({gain.low:.2f} to {gain.high:.2f})"
-        lines.append(
-            f"{one.id}: {math.hypot(*one.shift_m):.2f} m and {math.hypot(*one.rotation_deg):.1f}° from its plan "
-            f"(x {east}, y {north}, z {up} m){received}"
-        )
-    for change, cost in zip(found.changes, found.costs, strict=True):
-        if change.kind == VEHICLE:
-            continue
-        x, y, _, length, width, height, _ = change.box.tolist()
-        verb = "is new" if change.kind == "new" else "is no longer there"
-        costs = "" if math.isnan(cost) else f", {_cost(cost)}"
-        lines.append(f"{change.name} {verb}: {length:.1f} × {width:.1f} × {height:.1f} m at ({x:.1f}, {y:.1f}){costs}")
-    standing = sum(change.kind == VEHICLE for change in found.changes)
-    if standing:
-        lines.append(f"{counted(standing, 'vehicle')} standing on the carriageway: not counted as objects")
-    steps = found.coverage
-    lines.append(
-        f"coverage: {steps.promised:.1%} promised, {steps.installed:.1%} installed; in percentage points: "
-        f"pose {100 * (steps.pose - steps.promised):+.1f}, obstacles {100 * (steps.obstacles - steps.pose):+.1f}, "
-        f"gain {100 * (steps.installed - steps.obstacles):+.1f}"
-    )
-    returned = f"{steps.returned:.1%} of the targets have a return nearby in nearly every sweep"
-    lines.append(f"{returned}, for which one bright spot is enough")
-    return lines
-
-
-def _cost(cost: float) -> str:
-    points = f"{abs(100 * cost):.1f} points of coverage"
-    return "no effect on coverage" if abs(cost) < _LEAST_COST else f"{'costs' if cost > 0 else 'adds'} {points}"
+def _lines(record: VerificationRecord) -> Iterator[str]:
+    """Yield how far each sensor is from its plan, what has changed, and the coverage."""
+    for one in record.sensors:
+        yield f"{pose_text(one)} {gain_text(one)}"
+    for change in objects(record):
+        yield f"{change.name}: {change_text(change)}, {cost_text(change.coverage_cost)}"
+    if standing := vehicles(record):
+        yield f"{counted(standing, 'vehicle')} standing on the carriageway: not counted as objects"
+    yield coverage_text(record.coverage)
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -10,7 +10,7 @@ import bpy
 PARTS = (
     "session", "overlays", "work", "layout", "preferences", "survey", "sensors", "object_roles", "site_check",
     "junction_map", "site", "objective", "traffic", "scans", "coverage", "following", "results", "export", "detection",
-    "verification", "placement", "sidebar", "events",
+    "placement", "sidebar", "events",
 )  # fmt: skip
 """Modules of the panel, whose classes are registered in the order of their definition.
 

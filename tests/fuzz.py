@@ -291,7 +291,7 @@ def _read_blend(path: Path, _: bytes) -> None:
     require_physical([part.triangles for part in geometry.roads], "road")
 
 
-# --- elevation models and surveys
+# --- elevation models
 
 
 def _elevations(folder: Path) -> list[bytes]:
@@ -325,43 +325,6 @@ def _read_elevation(path: Path, _: bytes) -> None:
     at = model.at(np.array([[model.corner[0], model.corner[1]], [0.0, 0.0], [1e9, 1e9]]))
     require_physical({"heights": at}, "looked up", most=9000.0)
     require_physical(model.middle, "middle", most=1e8)
-
-
-def _surveys(suffix: str) -> Callable[[Path], list[bytes]]:
-    def samples(folder: Path) -> list[bytes]:
-        from tests.builders.dem_files import origin_at  # noqa: PLC0415
-        from tests.builders.survey_files import block_points, ground_points, write_survey  # noqa: PLC0415
-
-        random = np.random.default_rng(0)
-        x, y, _ = origin_at(52.5, 13.4)
-        parts = [ground_points(random, lambda a, b: 30 + 0 * a, 5.0), block_points(random, 0, 0, 3, 3, 38.0)]
-        wkt = 'PROJCS["UTM 33N",AUTHORITY["EPSG","25833"]]'
-        path = write_survey(folder / f"sample{suffix}", np.concatenate(parts), (x, y), wkt)
-        return [path.read_bytes()]
-
-    return samples
-
-
-def _mutate_survey(random: Random, content: bytes) -> bytes:
-    """Mostly other values in the header and the records that follow it."""
-    if random.random() < 0.3:
-        return mutated_bytes(random, content)
-    data = np.frombuffer(content, dtype=np.uint8).copy()
-    if random.random() < 0.4:  # number of records, sizes and counts
-        begin = (94, 96, 100, 105, 107, 131, 155, 179, 235, 243, 247)[int(random.integers(11))]
-        data[begin : begin + 4] = random.integers(256, size=4)
-        return data.tobytes()
-    where = random.integers(500, size=int(2 ** random.uniform(0, 4)))
-    data[where] = random.integers(256, size=len(where))
-    return data.tobytes()
-
-
-def _read_survey(path: Path, _: bytes) -> None:
-    from seip_addon.core.base.progress import finish  # noqa: PLC0415
-    from seip_addon.core.world.elevation.point_cloud import read_points, survey_system  # noqa: PLC0415
-
-    require_physical(survey_system(path)[1], "middle", most=1e8)
-    require_physical(finish(read_points(path, np.full(2, -1e8), np.full(2, 1e8))), most=1e8)
 
 
 # --- extracts and costs
@@ -518,9 +481,6 @@ FORMATS = {
     "osm": Format(".osm", _extracts, _mutate_extract, _read_extract),
     "osm.pbf": Format(".osm.pbf", _pbf_extracts, mutated_bytes, _read_extract),
     "dem": Format(".tif", _elevations, _mutate_elevation, _read_elevation),
-    **{
-        f"survey{suffix}": Format(suffix, _surveys(suffix), _mutate_survey, _read_survey) for suffix in (".las", ".laz")
-    },
     "sweep.pcd": Format(".pcd", _sweeps(".pcd"), _mutate_pcd, _read_sweep),
     "sweep.bin": Format(".bin", _sweeps(".bin"), _mutate_numbers, _read_sweep),
     "sweep.npz": Format(".npz", _sweeps(".npz"), _mutate_npz, _read_sweep),

@@ -1,5 +1,6 @@
 """Charts of coverage under pose errors and in traffic."""
 
+import math
 import os
 from collections.abc import Sequence
 from pathlib import Path
@@ -12,7 +13,6 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LinearSegmentedColormap, Normalize
 from matplotlib.ticker import PercentFormatter
 
-from seip_addon.core.base.counts import counted
 from seip_addon.core.base.estimates import IntervalEstimate
 from seip_addon.core.choosing.placement.deployment import Deployment
 from seip_addon.core.choosing.placement.objective import Solution
@@ -23,7 +23,6 @@ from seip_addon.core.output.pictures.chart_style import (
     DASHED,
     add_legend,
     colour,
-    interval_ends,
     limits_around,
     mark,
     new_figure,
@@ -33,7 +32,7 @@ from seip_addon.core.output.pictures.chart_style import (
 from seip_addon.core.output.pictures.drawing import draw_attribution, draw_polygons, draw_sensors
 from seip_addon.core.output.pictures.palette import INK, SEEN_COLOURS, SERIES_COLOURS, SOFT_INK
 from seip_addon.core.output.pictures.plan_map import MAX_GAP, draw_area
-from seip_addon.core.output.results.file_names import POSE_ERROR_PICTURES, TRAFFIC_PICTURES
+from seip_addon.core.output.results.file_names import POSE_ERROR_PICTURES, TRAFFIC_PICTURE
 from seip_addon.core.site.scene_geometry import SceneGeometry, joined
 from seip_addon.core.site.target_squares import target_squares
 from seip_addon.core.workflows.survey import Survey
@@ -49,13 +48,12 @@ TIME_CMAP = LinearSegmentedColormap.from_list("time", (SEEN_COLOURS[0], "#f7e3ae
 OBSTACLE_COLOUR = "#8b9285"
 PICTURE_SIDE = 6.4  # inches
 MARGIN_SHARE = 0.04  # of the region's size, shown around it
-BAR_STEP = 0.26  # from one bar to the next, of the width of 1.2 that is shown
 
 
 def save_evaluation_charts(folder: Path, survey: Survey, solution: Solution) -> None:
     """Draw the evaluation of a solution in a folder, as PNG, and remove the charts of an earlier result there."""
     evaluation, name = solution.evaluation, survey.site.name
-    for picture in (*POSE_ERROR_PICTURES, *TRAFFIC_PICTURES):
+    for picture in (*POSE_ERROR_PICTURES, TRAFFIC_PICTURE):
         (folder / picture).unlink(missing_ok=True)
     if evaluation is None:
         return
@@ -64,11 +62,8 @@ def save_evaluation_charts(folder: Path, survey: Survey, solution: Solution) -> 
         save_spread_chart(spread, [evaluation], f"{name}: coverage under pose errors")
         save_loss_chart(losses, evaluation.pose_study, f"{name}: what costs coverage")
     if evaluation.scenarios.kind == "traffic":
-        time_seen, traffic = (folder / picture for picture in TRAFFIC_PICTURES)
         title = f"{name}: share of time seen, {evaluation.robust.road_users:.0f} road users at a time"
-        save_time_map(time_seen, survey, solution.deployment, evaluation.robust, title)
-        sensors = counted(len(solution.deployment.sensors), "sensor")
-        save_traffic_chart(traffic, evaluation, sensors, f"{name}: empty road and traffic")
+        save_time_map(folder / TRAFFIC_PICTURE, survey, solution.deployment, evaluation.robust, title)
 
 
 def save_spread_chart(path: str | os.PathLike[str], comparisons: Sequence[Comparison], title: str) -> None:
@@ -135,33 +130,6 @@ def save_time_map(
     save_chart(path, figure, title)
 
 
-def save_traffic_chart(path: str | os.PathLike[str], comparison: Comparison, sensors: str, title: str) -> None:
-    """Draw coverage on the empty road and in traffic, for placements optimised without and with traffic, as PNG.
-
-    Parameters
-    ----------
-    sensors : str
-        Number and types of the sensors, like ``2 × type1``.
-    """
-    figure, (shares, changes) = new_figure(11.5, 4.6, 2)
-    empty, traffic = comparison.nominal, comparison.robust
-    _bar(shares, -1, IntervalEstimate(empty.nominal, empty.nominal, empty.nominal), "empty road")
-    _bar(shares, 0, empty.mean, "in traffic")
-    _bar(shares, 1, traffic.mean, "in traffic, placed on traffic")
-    shares.set_ylabel("share of the road seen", color=INK)
-    _dot(changes, -0.5, empty.estimate(empty.held_out - empty.nominal), 1, "change by traffic")
-    _dot(changes, 0.5, comparison.gain, 2, "gain by placing on traffic")
-    changes.axhline(0.0, color=SOFT_INK, linewidth=0.8, zorder=0)
-    changes.set_ylabel("change, 95 % interval", color=INK)
-    for axes, decimals in ((shares, 0), (changes, 1)):
-        axes.set_xticks([0], [sensors])
-        axes.set_xlim(-0.6, 0.6)
-        axes.yaxis.set_major_formatter(PercentFormatter(1.0, decimals=decimals))
-        style_axes(axes, grid="y")
-        axes.legend(frameon=False, fontsize=9, loc="upper center", bbox_to_anchor=(0.5, -0.1), ncols=3)
-    save_chart(path, figure, title)
-
-
 def _labelled(comparisons: Sequence[Comparison]) -> list[tuple[str, EvaluatedPlacement]]:
     """Return each placement with its name; of several nominal optima, each with its evaluated quantity."""
     nominal = list(dict.fromkeys(one.nominal for one in comparisons))
@@ -179,7 +147,8 @@ def _outcome(comparisons: Sequence[Comparison]) -> str:
 def _interval(
     axes: Axes, estimate: IntervalEstimate, height: float, shown: str, marker: str, label: str | None
 ) -> None:
-    axes.plot(interval_ends(estimate), [height, height], color=shown, linewidth=2.4)
+    low, high = (end if math.isfinite(end) else estimate.value for end in (estimate.low, estimate.high))
+    axes.plot([low, high], [height, height], color=shown, linewidth=2.4)
     axes.plot(estimate.value, height, marker=marker, color=shown, linestyle="none", label=label)
 
 
@@ -189,16 +158,3 @@ def _draw_place(panel: Axes, geometry: SceneGeometry) -> None:
     standing = shapely.intersection(outline(joined(geometry.occluders)), shown)
     draw_area(panel, standing, facecolor=OBSTACLE_COLOUR, edgecolor="#3d4542", linewidth=0.4, alpha=0.75, zorder=2)
     draw_area(panel, closed(geometry.region, MAX_GAP), facecolor="none", edgecolor=INK, linewidth=1.0, zorder=3)
-
-
-def _bar(axes: Axes, place: int, estimate: IntervalEstimate, label: str) -> None:
-    x = place * BAR_STEP
-    shown = (SEEN_COLOURS[1], SERIES_COLOURS[1], SERIES_COLOURS[2])[place + 1]
-    axes.bar(x, estimate.value, width=0.9 * BAR_STEP, color=shown, label=label)
-    axes.plot([x, x], interval_ends(estimate), color=INK, linewidth=1.4)
-
-
-def _dot(axes: Axes, place: float, estimate: IntervalEstimate, number: int, label: str) -> None:
-    x = place * BAR_STEP
-    axes.plot([x, x], interval_ends(estimate), color=SERIES_COLOURS[number], linewidth=2.4)
-    axes.plot(x, estimate.value, "o", color=SERIES_COLOURS[number], label=label)

@@ -19,7 +19,7 @@ from .frame_results import FrameResult, frame_result
 from .inference import detect
 from .recordings import MountedSensors, SampledRun, Simulator
 from .rules import MAIN_RULE, precisions
-from .training import deterministic
+from .training import make_deterministic
 
 AT_ONCE = (os.cpu_count() or 1) + 1  # works in threads on the CPU: one more than cores, as each also waits
 
@@ -89,7 +89,6 @@ def detect_in_runs(  # what measures where, what looks at it, and how
     placed: MountedSensors,
     runs: Sequence[SampledRun],
     detectors: Sequence[Detector],
-    threads: int,
 ) -> Generator[Progress, None, list[list[FrameResult]]]:
     """Detect road users in every frame of some runs; return the frames' results by detector."""
     region = simulator.static.region
@@ -103,8 +102,7 @@ def detect_in_runs(  # what measures where, what looks at it, and how
             done += 1
             frame = simulator.frame(placed, run, number)
             for detector, area, own in zip(detectors, looking, results, strict=True):
-                with deterministic(threads):
-                    found = detect(detector, area, frame)
+                found = detect(detector, area, frame)
                 own.append(
                     frame_result(frame, found, region=region, sensors=placed.positions, run=run.name, parked=run.parked)
                 )
@@ -160,9 +158,9 @@ def evaluate_detector(
     """
     if not placed.sensors:
         raise SeipError("the scene has no sensors: place some first, or open the placed.blend of a result")
-    works = [detect_in_runs(simulator, placed, [run], [detector], 1) for run in runs]
-    with deterministic(1):  # all the time, as torch keeps one such setting for all threads
-        found = yield from side_by_side(works, AT_ONCE if detector.device.type == "cpu" else 1)
+    works = [detect_in_runs(simulator, placed, [run], [detector]) for run in runs]
+    make_deterministic(1)
+    found = yield from side_by_side(works, AT_ONCE if detector.device.type == "cpu" else 1)
     frames = tuple(frame for (of_run,) in found for frame in of_run)
     evaluation = evaluate(frames, MAIN_RULE)
     users = [int(frame.truth.inside.sum()) for frame in frames]

@@ -24,7 +24,7 @@ from .detector_evaluation import AT_ONCE, side_by_side
 from .frame_results import EvaluatedBoxes, FrameResult, GroundTruth, frame_result
 from .inference import detect
 from .recordings import MountedSensors, SampledRun, Simulator, frames_key
-from .training import deterministic
+from .training import make_deterministic
 
 FOLDER = "detections"
 POINT_FIELDS = ("points", "sensor", "delay", "intensity", "instance", "foreground")
@@ -135,8 +135,8 @@ def detect_with_all(
             for (run, numbers), files in zip(sampled, missing, strict=True)
             if files
         ]
-        with deterministic(1):  # all the time, as torch keeps one such setting for all threads
-            yield from side_by_side(works, AT_ONCE if detector.device.type == "cpu" else 1)
+        make_deterministic(1)
+        yield from side_by_side(works, AT_ONCE if detector.device.type == "cpu" else 1)
     return [[frame for files in paths for frame in load_frames(files[one])] for one in chosen]
 
 
@@ -166,8 +166,7 @@ def _detect_in_run(
 def _detected(
     shared: SharedScans, placement: MountedSensors, run: SampledRun, frame: Frame, detector: Detector
 ) -> FrameResult:
-    with deterministic(1):
-        found = detect(detector, shared.simulator.area(detector.settings.pillar), frame)
+    found = detect(detector, shared.simulator.area(detector.settings.pillar), frame)
     return frame_result(
         some_points(frame, frame.foreground),
         found,

@@ -9,9 +9,7 @@ from __future__ import annotations
 import math
 import multiprocessing
 import os
-import threading
 from collections.abc import Generator, Iterator, Sequence
-from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
@@ -42,9 +40,6 @@ MAX_CROP_SHIFT = 0.25  # share of a window that it lies beside its road user at 
 MAX_ROTATION, MAX_STRETCH = math.radians(8.0), 0.05  # of training samples; the rotation is in addition to quarter turns
 MAX_LIFT = 0.15  # metres by which all of a window is raised or lowered at most: a road is not known exactly
 MAX_GRADIENT_NORM = 10.0  # norm beyond which a gradient is cut, as published
-_LOCK = threading.Lock()
-_BEFORE: list[tuple[int, int | str, bool]] = []
-"""Settings of torch before each block of `deterministic` that is open, in any thread; the first are restored."""
 
 
 @dataclass(frozen=True)
@@ -123,17 +118,18 @@ def train(  # noqa: PLR0913  # data, settings, device and initial weights
     splits = {"training": recordings, "validation": validation}
     require_separate({what: [sampled.recording for sampled in some] for what, some in splits.items()})
     run = _Run(recordings, validation, network, settings, device, start)
+    if run.detector.device.type == "cpu":  # torch lacks a fixed order of sums for pillars on a GPU
+        make_deterministic(settings.threads)
     if store is not None and Path(store).exists():
         run.restore(store)
     yield run.progress()
     batches = run.batches()
     while not run.done:
-        with run.arithmetic():  # and no longer: whoever steps this may use torch in between
-            run.advance(next(batches))
-            if run.step % settings.validate_every == 0 or run.step == settings.steps:
-                run.validate()
-                if store is not None:
-                    run.store(store)
+        run.advance(next(batches))
+        if run.step % settings.validate_every == 0 or run.step == settings.steps:
+            run.validate()
+            if store is not None:
+                run.store(store)
         yield run.progress()
     return run.result()
 
@@ -170,10 +166,6 @@ class _Run:
         self.step = 0
         self.curve = LearningCurve()
         self.best = _copied(self.detector.state_dict())
-
-    def arithmetic(self) -> AbstractContextManager[None]:
-        """Return the context of a step: a fixed order of sums on the CPU, which torch lacks for pillars on a GPU."""
-        return deterministic(self.settings.threads) if self.detector.device.type == "cpu" else nullcontext()
 
     @property
     def done(self) -> bool:
@@ -410,28 +402,11 @@ def _copied(state: dict[str, Any]) -> dict[str, Tensor]:
     return {name: value.detach().clone() for name, value in state.items()}
 
 
-@contextmanager
-def deterministic(threads: int) -> Iterator[None]:
-    """Have torch do every sum in the same order, every time; within another such block the number of threads stays."""
+def make_deterministic(threads: int) -> None:
+    """Have torch do every sum in the same order, every time, from now on and in all threads of the process."""
     os.environ.setdefault("CUBLAS_WORKSPACE_CONFIG", ":4096:8")  # what CUDA asks for to do so
-    # torch has one such setting for the whole process, and trainings run in several threads: only the first block
-    # changes it, and only the last restores it.
-    with _LOCK:
-        filled = bool(torch.utils.deterministic.fill_uninitialized_memory)  # type: ignore[attr-defined]  # torch types lack it
-        _BEFORE.append((torch.get_num_threads(), torch.get_deterministic_debug_mode(), filled))
-        if len(_BEFORE) == 1:
-            _set(threads, "error", fill=False)  # filling is a debugging aid, and takes a tenth
-    try:
-        yield
-    finally:
-        with _LOCK:
-            known, mode, fill = _BEFORE.pop()
-            if not _BEFORE:
-                _set(known, mode, fill=fill)
-
-
-def _set(threads: int, mode: int | str, *, fill: bool) -> None:
     torch.set_num_threads(threads)
     # `torch.use_deterministic_algorithms` sets the same, but first imports torch's compiler, which is slow.
-    torch.set_deterministic_debug_mode(mode)
-    torch.utils.deterministic.fill_uninitialized_memory = fill  # type: ignore[attr-defined]
+    torch.set_deterministic_debug_mode("error")
+    # filling memory is a debugging aid, and takes a tenth
+    torch.utils.deterministic.fill_uninitialized_memory = False  # type: ignore[attr-defined]  # torch types lack it

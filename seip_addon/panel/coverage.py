@@ -23,9 +23,8 @@ from ..core.output.pictures.palette import (
 )
 from ..core.sensing.visibility.sight_lines import SightLines, pose_at, sight_lines
 from ..scene import contract
-from ..scene.coverage_colours import colour_coverage
 from ..scene.sensors import placed_sensors, pose_of
-from ..scene.write import ASPECT, LIFT, aspects_of, coverage_of, shown_legend
+from ..scene.write import ASPECT, LIFT, aspects_of, colour_coverage, coverage_of, shown_legend
 from . import overlays, scans
 from .layout import draw_reason, draw_run, draw_sentence
 from .legend import Block, Colour, Entry, Label

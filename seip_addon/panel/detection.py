@@ -115,23 +115,17 @@ def _detected(job: DetectionJob, folder: Path) -> Generator[Progress, None, str]
 
 @contextmanager
 def saved_scene(folder: Path) -> Iterator[Path]:
-    """Save the scene as it is in a folder of results, for another process, and remove it at the end."""
-    with (
-        folder_of_result(folder),
-        TemporaryDirectory(prefix=unfinished_name(folder, "scene-").name, dir=folder) as temporary,
-    ):
-        path = Path(temporary) / "scene.blend"
-        save_blend(path)
-        yield path
+    """Save the scene as it is in a folder of results, for another process, and remove it at the end.
 
-
-@contextmanager
-def folder_of_result(folder: Path) -> Iterator[None]:
-    """Make a folder where it is missing, and take it away again where nothing was written to it."""
+    The folder is made where it is missing, and taken away again where nothing was written to it.
+    """
     new = [one for one in (folder, *folder.parents) if not one.exists()]
     check_folder(folder)
     try:
-        yield
+        with TemporaryDirectory(prefix=unfinished_name(folder, "scene-").name, dir=folder) as temporary:
+            path = Path(temporary) / "scene.blend"
+            save_blend(path)
+            yield path
     finally:
         with suppress(OSError):  # it holds something
             for one in new:

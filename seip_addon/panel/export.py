@@ -11,17 +11,16 @@ import bpy
 
 from ..core.base.progress import Progress
 from ..core.output.pictures.colours import unpacked_counts
+from ..core.output.pictures.labelled_view import save_labelled_view
 from ..core.output.report.sections import write_report
 from ..core.output.results.placement_record import parsed_record
 from ..core.storage.files import check_folder
-from ..scene.blend_file import save_blend
-from ..scene.coverage_colours import show_seen_by
-from ..scene.gltf import save_glb
+from ..scene.blend_file import save_blend, save_glb
 from ..scene.pieces import tidy_pieces
 from ..scene.read import attribution_of
-from ..scene.render_elsewhere import render_elsewhere
-from ..scene.result_folder import result_files, write_pictures, write_tables
-from ..scene.write import coverage_of, shown_legend
+from ..scene.render import render_elsewhere
+from ..scene.result_folder import result_files, write_tables
+from ..scene.write import coverage_of, show_seen_by, shown_legend
 from . import scene_status
 from .layout import draw_path, draw_reason, draw_run
 from .properties import absolute, saved_path
@@ -74,13 +73,13 @@ def _exported(folder: Path, scene: bpy.types.Scene) -> Generator[Progress, None,
         survey, solution = state.placed()
         record = parsed_record(state.record)
         record = replace(record, settings={**record.settings, "render": render})
-        plans = yield from write_tables(part, survey, solution, record)
-        deployment = solution.deployment
-        with TemporaryDirectory(prefix="seip-") as raw:
-            rendered = None
-            if render:
-                rendered = yield from render_elsewhere(Path(raw), part["placed.blend"], name, survey.site, deployment)
-            write_pictures(part, survey, record, deployment, plans, rendered, legend)
+        yield from write_tables(part, survey, solution, record)
+        if render:
+            site, deployment, created = survey.site, solution.deployment, record.times.created
+            with TemporaryDirectory(prefix="seip-") as temporary:
+                raw = Path(temporary) / "view.png"
+                sight = yield from render_elsewhere(raw, part["placed.blend"], name, site, deployment)
+                save_labelled_view(part["view.png"], raw, site, deployment, legend, sight, created=created)
     survey.grid.save(folder / "visibility.npz")
     return state
 

@@ -19,8 +19,8 @@ from ..core.sensing.scans.sensor import MountedSensor
 from ..core.sensing.visibility.visibility_model import visibility_model
 from ..core.workflows.returns import SensorReturns
 from ..scene import contract
-from ..scene.coverage_colours import show_seen_by
 from ..scene.sensors import read_sensors
+from ..scene.write import show_seen_by
 from . import preferences
 from .layout import draw_sentence
 from .scene_status import same_pose, sensor_edits

@@ -45,19 +45,18 @@ ICONS = {"changed": "ERROR", "working": "TIME"}
 """Icons of the parts that every header has room for: they take the place of the words where these have none."""
 _SITE = ("choose_map", "download_map", "build_site")
 _SIMULATION, _SCAN, _DATASET = ("simulate_traffic", "install_sumo"), ("scan_frame",), ("write_dataset",)
-_DETECTION, _VERIFICATION = ("detect",), ("verify",)
+_DETECTION = ("detect",)
 WORK: Mapping[str, tuple[str, ...]] = {
     "site": (*_SITE, "load_example", "check_site", "install_sumo"),
     "change_site": (*_SITE, "install_sumo"),
     "placement": ("solve_placement", "judge_placement", "compare_scene", "evaluate_sensors"),
     "results": ("follow_sensors", "show_sight_lines"),
     "view": ("show_sight_lines",),
-    "traffic": ("load_traffic", *_SIMULATION, *_SCAN, *_DATASET, *_DETECTION, *_VERIFICATION),
+    "traffic": ("load_traffic", *_SIMULATION, *_SCAN, *_DATASET, *_DETECTION),
     "simulation": _SIMULATION,
     "scan": _SCAN,
     "dataset": _DATASET,
     "detection": _DETECTION,
-    "verification": _VERIFICATION,
     "export": ("write_report", "export_result"),
 }
 """Long operators whose progress is drawn in each section, which its header shows while the section is closed."""

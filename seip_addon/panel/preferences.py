@@ -14,7 +14,7 @@ from typing import Any, TypeVar
 import bpy
 
 from ..core.base.errors import SeipError
-from ..core.programs.sumo_installation import BY_HAND, install_sumo, installed_sumo, sumo_size
+from ..core.programs.sumo_installation import BY_HAND, DOWNLOAD_SIZE, install_sumo, installed_sumo
 from ..core.programs.sumo_programs import Sumo, find_sumo, sumo_version
 from ..core.sensing.lidar.catalogue import load_catalogue
 from ..core.sensing.lidar.model import LidarModel
@@ -192,7 +192,7 @@ def draw_status(layout: bpy.types.UILayout) -> None:
         return
     if reason := why_no_installation():
         draw_sentence(layout, f"{reason}.", icon="INFO")
-    text = f"{SEIP_OT_install_sumo.bl_label} ({sumo_size().download} MB)"
+    text = f"{SEIP_OT_install_sumo.bl_label} ({DOWNLOAD_SIZE} MB)"
     draw_run(layout, "seip.install_sumo", icon="IMPORT", text=text)
 
 

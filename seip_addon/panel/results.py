@@ -25,9 +25,8 @@ from ..core.storage.files import digest
 from ..core.workflows.moved_sensors import BY_HAND, evaluate_moved_sensors
 from ..core.workflows.records import record_of
 from ..scene import contract
-from ..scene.coverage_colours import recolour
 from ..scene.sensors import labelled_sensors, placed_sensors, read_sensors
-from ..scene.write import aspects_of, coverage_of, take_over
+from ..scene.write import aspects_of, coverage_of, recolour, take_over
 from . import following, preferences, scene_status
 from .coverage import draw_view
 from .following import draw_followed

@@ -27,7 +27,6 @@ from ..core.base.progress import Progress, finish
 from ..core.choosing.placement.objective import Solution
 from ..core.choosing.placement.returns_summary import ReturnsSummary
 from ..core.sensing.lidar.model import LidarModel
-from ..core.sensing.recordings.verification import Verification
 from ..core.sensing.scans.frame import Frame
 from ..core.sensing.scans.run_folder import Run
 from ..core.sensing.scans.sensor import MountedSensor
@@ -247,12 +246,11 @@ class LastScan:
 
 @dataclass
 class SceneMemory:
-    """Memory of a scene: its state, check, last scan, and last verification with changes of the scene since."""
+    """Memory of a scene: its state, check and last scan."""
 
     state: SceneState | None = None
     check: CheckedScene | None = None
     scan: LastScan | None = None
-    verification: tuple[Verification, Watch] | None = None
 
 
 @dataclass

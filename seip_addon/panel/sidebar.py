@@ -21,7 +21,6 @@ from . import (
     site_check,
     survey,
     traffic,
-    verification,
 )
 from .layout import Sidebar, Status, draw_sections
 
@@ -66,7 +65,6 @@ class SEIP_PG_sections(bpy.types.PropertyGroup):
     scan: _section("Scan")
     dataset: _section("Dataset")
     detection: _section("Detection")
-    verification: _section("Verification")
     export: _section("Export")
 
     def follow_steps(self, scene: bpy.types.Scene) -> None:
@@ -95,7 +93,6 @@ class SEIP_PG_scene(bpy.types.PropertyGroup):
     traffic: PointerProperty(type=traffic.SEIP_PG_traffic)
     simulation: PointerProperty(type=traffic.SEIP_PG_simulation)
     detection: PointerProperty(type=detection.SEIP_PG_detection)
-    verification: PointerProperty(type=verification.SEIP_PG_verification)
 
 
 class SEIP_PT_steps(Sidebar, bpy.types.Panel):
@@ -124,7 +121,6 @@ def draw_traffic(layout: bpy.types.UILayout, context: bpy.types.Context) -> None
         "scan": scans.draw_scan,
         "dataset": scans.draw_dataset,
         "detection": detection.draw,
-        "verification": verification.draw,
     }
     draw_sections(layout, parts, context, _traffic(context.scene))
 
@@ -134,7 +130,6 @@ def _traffic(scene: bpy.types.Scene) -> dict[str, Status]:
     return {
         "simulation": traffic.simulation_status(scene),
         "detection": detection.status(scene),
-        "verification": verification.status(scene),
     }
 
 

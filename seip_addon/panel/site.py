@@ -14,14 +14,12 @@ from ..core.base.progress import Progress, finish
 from ..core.programs.sumo_programs import NETWORK_SUFFIX
 from ..core.workflows.site_building import BuiltSite, SiteRequest, build_site, site_source
 from ..core.workflows.site_places import SitePlaces, site_places
-from ..core.world.elevation.at_place import TerrainRequest
 from ..core.world.openstreetmap.map_links import parsed_position
 from ..core.world.openstreetmap.site import is_extract
 from ..core.world.streetscape.description import DEFAULT_RADIUS
 from ..core.world.streetscape.site_file import DESCRIPTION_SUFFIX
 from ..scene import contract
-from ..scene.build import build_scene, remove_site
-from ..scene.startup import remove_startup_objects
+from ..scene.build import build_scene, remove_site, remove_startup_objects
 from ..scene.views import frame_site
 from . import overlays, preferences, scene_status, sensors, traffic
 from .layout import (
@@ -29,7 +27,6 @@ from .layout import (
     draw_run,
     draw_sections,
     draw_sentence,
-    draw_settings,
     settings_column,
 )
 from .object_roles import ROLE_ITEMS, WritesScene, draw_roles
@@ -40,12 +37,11 @@ from .site_check import draw_check, draw_contents
 from .work import Job, LongWork, Outcome
 
 _FILE = {"subtype": "FILE_PATH", "options": {"PATH_SUPPORTS_BLEND_RELATIVE"}}
-_CODE = {"min": 0, "max": 999_999}
 EXTRACTS = "*.osm;*.osm.gz;*.osm.pbf"
 """Files of OpenStreetMap, as the file browser filters them."""
 NO_NEW_SITE = "Paste latitude and longitude, or a link of a web map, into New Site"
 NO_PLACE = "Choose a junction, or give latitude and longitude"
-COPIED = ("source", "position", "region_shape", "radius", "osm", "terrain", "terrain_epsg")
+COPIED = ("source", "position", "region_shape", "radius", "osm", "terrain")
 """Properties of a choice that a site in a new scene takes over."""
 
 
@@ -93,8 +89,7 @@ class SEIP_PG_site(bpy.types.PropertyGroup):
         step=1000,
     )
     osm: of_setting(SiteRequest, "osm", "Surroundings", **_FILE)
-    terrain: of_setting(TerrainRequest, "path", "Terrain", **_FILE)
-    terrain_epsg: of_setting(TerrainRequest, "epsg", "EPSG", default=0, **_CODE)
+    terrain: of_setting(SiteRequest, "terrain", "Terrain", **_FILE)
     role: EnumProperty(name="Role", description="Role of objects in the placement", items=ROLE_ITEMS)
 
     def is_described(self) -> bool:
@@ -143,7 +138,7 @@ class SEIP_PG_site(bpy.types.PropertyGroup):
 
     def _sources(self) -> dict[str, Any]:
         """Return the fields of the request that name further files."""
-        terrain = TerrainRequest(absolute(self.terrain), self.terrain_epsg or None) if self.terrain else None
+        terrain = absolute(self.terrain) if self.terrain else None
         osm = absolute(self.osm) if self.osm and not self.is_extract() else None
         return {"osm": osm, "terrain": terrain}
 
@@ -419,7 +414,6 @@ def _draw_sources(layout: bpy.types.UILayout, site: SEIP_PG_site) -> None:
     row.enabled = not site.is_extract()  # which has its own buildings, trees and posts
     draw_path(row, site, "osm")
     draw_path(layout, site, "terrain")
-    draw_settings(layout, site, "terrain_epsg").enabled = bool(site.terrain)
 
 
 def _place_text(site: SEIP_PG_site) -> str:

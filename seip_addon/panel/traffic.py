@@ -37,6 +37,11 @@ EXAMPLES = Path(__file__).resolve().parents[2] / "scenes"
 """Folder of the example: beside the package, in a checkout as in the extension."""
 EXAMPLE_RUN, EXAMPLE_MAP = EXAMPLES / "junction_traffic" / "run-1.npz", EXAMPLES / "junction.xodr"
 EXAMPLE_SITE = EXAMPLES / "junction.toml"
+FORMAT_ITEMS = tuple(
+    (key, FORMATS[key].name, f"Write the dataset as {FORMATS[key].name}", "NONE", number)
+    for key, number in (("openpcdet", 1), ("kitti", 4), ("pcd", 8))
+)
+"""Formats of datasets with the numbers by which a .blend stores them; 2 was that of a format that is gone."""
 NO_FILE = "There is no traffic file: name one, or animate objects of your own in SEIP Traffic."
 _MOST_SECONDS = 3600.0
 NO_MAP = "There is no map to simulate traffic on: name the OpenDRIVE map (.xodr) that this site was built from."
@@ -99,7 +104,7 @@ class SEIP_PG_traffic(bpy.types.PropertyGroup):
     formats: EnumProperty(
         name="Formats",
         description="Datasets to write beside the frames",
-        items=tuple((key, kind.name, f"Write the dataset as {kind.name}") for key, kind in FORMATS.items()),
+        items=FORMAT_ITEMS,
         options={"ENUM_FLAG"},
         default={"openpcdet"},
     )

@@ -1,18 +1,26 @@
-"""Opening and saving .blend files.
+"""Opening and saving .blend files, and saving glTF.
 
 `tests/scene/test_blend_file.py` shows its use.
 """
 
 from __future__ import annotations
 
+import contextlib
+import io
+import logging
+from collections.abc import Sequence
 from pathlib import Path
 
+import addon_utils
 import bpy
 
 from ..core.base.errors import SeipError
 from ..core.storage.files import whole_file
 from .interrupts import held_signals
 from .views import set_up_view
+
+GLTF_EXPORTER = "io_scene_gltf2"
+LOG = logging.getLogger(__name__)
 
 
 def new_file() -> bpy.types.Scene:
@@ -115,3 +123,34 @@ def _set_up_views() -> None:
         set_up_view(view)
         if bpy.context.scene.camera is not None:
             view.region_3d.view_perspective = "CAMERA"
+
+
+def save_glb(path: Path, attribution: Sequence[str]) -> None:
+    """Write what renders of the open scene show as binary glTF; a Blender without exporter says so.
+
+    Lengths are metres; glTF's y axis is up. Custom properties are kept as extras.
+
+    Parameters
+    ----------
+    attribution : sequence of str
+        Credits of the scene's sources: the asset's copyright.
+    """
+    try:
+        if "gltf" not in dir(bpy.ops.export_scene):
+            addon_utils.enable(GLTF_EXPORTER)
+        with held_signals(), contextlib.redirect_stdout(io.StringIO()):  # where it tells of every mesh
+            bpy.ops.export_scene.gltf(
+                filepath=str(path),
+                export_format="GLB",
+                use_active_scene=True,
+                use_renderable=True,
+                export_apply=True,
+                export_extras=True,
+                export_animations=False,
+                export_cameras=False,
+                export_lights=False,
+                export_copyright="; ".join(attribution),
+            )
+    except (RuntimeError, AttributeError, TypeError) as error:  # it is missing, or of another version
+        LOG.warning("%s is not written: Blender's glTF exporter failed (%s)", path.name, error)
+        path.unlink(missing_ok=True)

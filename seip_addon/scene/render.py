@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import importlib
+import json
 import math
-from collections.abc import Iterator, Mapping, Sequence
+import sys
+from collections.abc import Generator, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,12 +15,13 @@ from typing import Any
 import bpy
 import numpy as np
 from mathutils import Matrix, Vector
-from PIL import Image
 
 from ..core.base.arrays import Boolean, Float
 from ..core.base.errors import SeipError
+from ..core.base.progress import Progress
 from ..core.choosing.placement.deployment import Deployment
-from ..core.output.pictures.viewpoint import MOST, TILE, Sight, Viewpoint, frame, viewpoints
+from ..core.output.pictures.viewpoint import Sight, Viewpoint, frame
+from ..core.programs.child_process import run_logged
 from ..core.site.site import Site
 from . import contract
 from .daylight import add_daylight
@@ -26,15 +29,12 @@ from .interrupts import held_signals
 
 WIDTH, HEIGHT = 1440, 810  # pixels
 SAMPLES, DENOISED_SAMPLES = 12, 1  # without and with a denoiser
-"""Against 150 samples, close-ups of the shipped junction differ by 3.8 and 4.4 of 255 (root mean square)."""
 AZIMUTHS, ELEVATION = np.radians(-115.0 + 45.0 * np.arange(8)), math.radians(60.0)
 """Directions of the camera, seen from the region."""
 MOST_POINTS = 400  # places on the road at which the view is checked for obstacles
 EQUAL_VIEW = 0.05  # share of the road by which views that hide less than others are as good as the best
 FIELD_OF_VIEW = math.radians(35.0)  # across the picture
 ROOM = 1.07  # around the region and the sensors
-CLOSE_REACH = 300.0  # metres from the camera of a close-up, as far as anything is shown
-FOOT_ROOM = np.array((0.0, 0.0, 1.0))  # metres above the foot of a sensor
 SENSOR_ROOM = 0.5  # metres round a sensor that its own body and bracket take up
 UNSEEN_TYPES = {"LIGHT", "CAMERA", "SPEAKER", "LIGHT_PROBE"}
 
@@ -46,91 +46,103 @@ class Shot:
     Parameters
     ----------
     viewpoints : tuple of Viewpoint
-        In order of preference; the first that hides few enough of the points is taken, see `slack`.
+        In order of preference; the first that hides little enough of the road is taken, see `EQUAL_VIEW`.
     reach : float, metres
-        From the camera, as far as anything is shown.
+        Distance from the camera up to which anything is shown.
     sensors : (k, 3) float64, metres
-        Optical centres; in a close-up that of one sensor, then a point low above its foot.
-    points : (n, 3) float64, metres
-        Points that should be visible.
-    size : (int, int), pixels
-        Width and height of the picture.
-    slack : float
-        Share of the points that a viewpoint may hide more than the best one.
+        Optical centres.
+    road : (n, 3) float64, metres
+        Points of the road that should be visible.
     """
 
     viewpoints: tuple[Viewpoint, ...]
     reach: float
     sensors: Float
-    points: Float
-    size: tuple[int, int]
-    slack: float = 0.0
+    road: Float
 
     def as_json(self) -> list[Any]:
         """Return it as a JSON value for `from_json`."""
         views = [[array.tolist() for array in (view.place, view.axes, view.slopes)] for view in self.viewpoints]
-        return [views, self.reach, self.sensors.tolist(), self.points.tolist(), self.size, self.slack]
+        return [views, self.reach, self.sensors.tolist(), self.road.tolist()]
 
     @classmethod
     def from_json(cls, value: list[Any]) -> Shot:
-        """Return what `as_json` wrote down."""
-        views, reach, sensors, points, (width, height), slack = value
+        """Return the settings that `as_json` wrote."""
+        views, reach, sensors, road = value
         viewpoints = tuple(Viewpoint(*(np.array(array) for array in view)) for view in views)
-        sensors, points = (np.array(xyz, dtype=np.float64).reshape(-1, 3) for xyz in (sensors, points))
-        return cls(viewpoints, reach, sensors, points, (width, height), slack)
+        sensors, road = (np.array(xyz, dtype=np.float64).reshape(-1, 3) for xyz in (sensors, road))
+        return cls(viewpoints, reach, sensors, road)
 
 
-@dataclass(frozen=True, eq=False)
-class Taken:
-    """Viewpoint of a picture that was taken, and what it hides.
-
-    Parameters
-    ----------
-    viewpoint : int
-        Number of the shot's viewpoint.
-    hidden : (k,) bool
-        Sensors that something stands in front of.
-    """
-
-    viewpoint: int
-    hidden: Boolean
-
-    def as_json(self) -> list[Any]:
-        """Return it as a JSON value for `from_json`."""
-        return [self.viewpoint, self.hidden.tolist()]
-
-    @classmethod
-    def from_json(cls, value: list[Any]) -> Taken:
-        """Return what `as_json` wrote down."""
-        return cls(value[0], np.array(value[1], dtype=bool))
+def shot_of(site: Site, deployment: Deployment) -> Shot:
+    """Return a shot with the whole region and all sensors in its picture."""
+    slope = math.tan(FIELD_OF_VIEW / 2.0)
+    slopes = np.array((slope, slope * HEIGHT / WIDTH))
+    sensors = np.array([sensor.xyz for sensor in deployment.sensors]).reshape(-1, 3)
+    points = np.vstack((site.targets.xyz, sensors))
+    # From the nearest camera position, the region is largest in the picture.
+    tight = sorted(
+        (frame(points, azimuth, ELEVATION, slopes / ROOM) for azimuth in AZIMUTHS),
+        key=lambda view: round(float(np.linalg.norm(view.place - points.mean(axis=0))), 3),
+    )
+    reach = 2.0 * max(float(np.linalg.norm(points - view.place, axis=1).max()) for view in tight)
+    around = tuple(Viewpoint(view.place, view.axes, slopes) for view in tight)
+    return Shot(around, reach, sensors, site.targets.xyz[:: math.ceil(len(site.targets) / MOST_POINTS)])
 
 
-@dataclass(frozen=True, eq=False)
-class RenderedPictures:
-    """The rendered view and the close-ups of each sensor, without labels.
+def render_elsewhere(
+    raw: Path, blend: Path, scene: str, site: Site, deployment: Deployment
+) -> Generator[Progress, None, Sight]:
+    """Render a scene without labels, from the side that hides least of the road, in a Blender of its own.
+
+    The program itself remains responsive, and Ctrl-C ends it at once; Blender's own rendering allows neither.
 
     Parameters
     ----------
-    view : path
-        Picture of the whole site.
-    sight : Sight
-        Where sensors and targets are on it.
-    close_ups : tuple of Image
-        In the order of the sensors, at most `close_ups.MOST`.
-    places : mapping of str to (float, float)
-        Where each sensor is on its close-up, by its label, in shares of width and height from the lower left.
+    raw : path
+        Picture to write, in a folder for temporary files.
+    blend : path
+        File with the scene.
+    scene : str
+        Name of the scene.
+
+    Yields
+    ------
+    Progress
+        Ten times a second; closing the generator ends the other Blender.
+
+    Raises
+    ------
+    SeipError
+        The other Blender failed.
     """
+    shot = shot_of(site, deployment)
+    job, log, answer = (raw.with_name(name) for name in ("job.json", "log", "taken.json"))
+    request = {"path": sys.path, "blend": str(blend), "scene": scene, "raw": str(raw), "answer": str(answer)}
+    job.write_text(json.dumps(request | {"shot": shot.as_json()}))
+    temporary = dict.fromkeys(("TMPDIR", "TEMP", "TMP"), str(raw.parent))  # which Blender leaves when it is ended
+    yield from run_logged(_command(job), log, lambda _: Progress(0, 0, "rendering"), environment=temporary)
+    try:
+        number, hidden = json.loads(answer.read_text())
+    except OSError as error:
+        last = log.read_text(errors="replace").strip().splitlines()[-1:]
+        raise SeipError(f"the view could not be rendered ({' '.join(last)}): export without it") from error
+    view = shot.viewpoints[number]
+    return Sight(view.project(shot.sensors), np.array(hidden, dtype=bool), view.project(site.targets.xyz))
 
-    view: Path
-    sight: Sight
-    close_ups: tuple[Image.Image, ...]
-    places: Mapping[str, tuple[float, float]]
+
+def _command(job: Path) -> list[str]:
+    """Return the command that runs a job of `render_job` in a Blender without a window, or on the bpy module."""
+    script = str(Path(__file__).with_name("render_job.py"))
+    if bpy.app.binary_path:
+        return [bpy.app.binary_path, "-b", "--factory-startup", "-P", script, "--", str(job)]
+    return [sys.executable, script, "--", str(job)]
 
 
-def take(shots: Sequence[Shot], scene: bpy.types.Scene, raws: Sequence[Path]) -> list[Taken]:
-    """Render pictures of a scene without labels, and return how each was taken.
+def take(shot: Shot, scene: bpy.types.Scene, raw: Path) -> tuple[int, Boolean]:
+    """Render a picture of a scene without labels.
 
-    The pictures are taken in a scene that shares the objects and is removed afterwards, under its own camera, light and
+    The picture is taken in a scene that shares the objects and is removed afterwards, under its own camera, light and
     settings: the user's scene is not touched and every scene is lit alike. Cycles renders on the processor, because the
     other engines end the process where there is no OpenGL.
 
@@ -138,22 +150,25 @@ def take(shots: Sequence[Shot], scene: bpy.types.Scene, raws: Sequence[Path]) ->
     ----------
     scene : bpy.types.Scene
         Holds the result of `write_result`.
+
+    Returns
+    -------
+    int, (k,) bool
+        Number of the viewpoint, and the sensors that something stands in front of.
     """
-    taken = []
     with _stage(scene) as stage:
         add_daylight(stage, stage.collection)
         camera = _add_camera(stage)
         _set_up(stage)
-        for shot, raw in zip(shots, raws, strict=True):
-            hidden = np.array([_hidden(stage, shot.points, viewpoint).mean() for viewpoint in shot.viewpoints])
-            number = int(np.argmax(hidden <= hidden.min() + shot.slack))
-            taken.append(Taken(number, _hidden(stage, shot.sensors, shot.viewpoints[number])))
-            _aim(camera, shot.viewpoints[number], shot.reach)
-            stage.render.resolution_x, stage.render.resolution_y = shot.size
-            stage.render.filepath = str(raw)
-            with held_signals():
-                bpy.ops.render.render(scene=stage.name, write_still=True)
-    return taken
+        covered = np.array([_hidden(stage, shot.road, viewpoint).mean() for viewpoint in shot.viewpoints])
+        number = int(np.argmax(covered <= covered.min() + EQUAL_VIEW))
+        hidden = _hidden(stage, shot.sensors, shot.viewpoints[number])
+        _aim(camera, shot.viewpoints[number], shot.reach)
+        stage.render.resolution_x, stage.render.resolution_y = WIDTH, HEIGHT
+        stage.render.filepath = str(raw)
+        with held_signals():
+            bpy.ops.render.render(scene=stage.name, write_still=True)
+    return number, hidden
 
 
 @contextmanager
@@ -188,49 +203,6 @@ def _rendered_objects(scene: bpy.types.Scene) -> list[bpy.types.Object]:
     ]
 
 
-def shots_of(site: Site, deployment: Deployment) -> list[Shot]:
-    """Return a shot that has the whole region and all sensors in its picture, and one close to each sensor."""
-    slope = math.tan(FIELD_OF_VIEW / 2.0)
-    slopes = np.array((slope, slope * HEIGHT / WIDTH))
-    sensors = np.array([sensor.xyz for sensor in deployment.sensors]).reshape(-1, 3)
-    points = np.vstack((site.targets.xyz, sensors))
-    # From the nearest camera position, the region is largest in the picture.
-    tight = sorted(
-        (frame(points, azimuth, ELEVATION, slopes / ROOM) for azimuth in AZIMUTHS),
-        key=lambda view: round(float(np.linalg.norm(view.place - points.mean(axis=0))), 3),
-    )
-    reach = 2.0 * max(float(np.linalg.norm(points - view.place, axis=1).max()) for view in tight)
-    around = tuple(Viewpoint(view.place, view.axes, slopes) for view in tight)
-    road = site.targets.xyz[:: math.ceil(len(site.targets) / MOST_POINTS)]
-    whole = Shot(around, reach, sensors, road, (WIDTH, HEIGHT), EQUAL_VIEW)
-    near = []
-    for sensor in deployment.sensors[:MOST]:
-        marked = np.vstack((sensor.xyz, sensor.foot + FOOT_ROOM))
-        near.append(Shot(tuple(viewpoints(site, sensor)), max(reach, CLOSE_REACH), marked, marked, TILE))
-    return [whole, *near]
-
-
-def raw_files(folder: Path, shots: Sequence[Shot]) -> list[Path]:
-    """Return the files of the raw pictures of shots."""
-    return [folder / f"view{number}.png" for number in range(len(shots))]
-
-
-def labelled_pictures(
-    shots: Sequence[Shot], taken: Sequence[Taken], raws: Sequence[Path], site: Site, deployment: Deployment
-) -> RenderedPictures:
-    """Return rendered pictures with the places of sensors on them."""
-    whole, *near = shots
-    view = whole.viewpoints[taken[0].viewpoint]
-    sight = Sight(view.project(whole.sensors), taken[0].hidden, view.project(site.targets.xyz))
-    places, images = {}, []
-    for shot, how, raw, sensor in zip(near, taken[1:], raws[1:], deployment.sensors, strict=False):
-        x, y = shot.viewpoints[how.viewpoint].project(shot.sensors)[0]
-        places[sensor.label] = (float(x), float(y))
-        with Image.open(raw) as picture:
-            images.append(picture.copy())
-    return RenderedPictures(raws[0], sight, tuple(images), places)
-
-
 def _add_camera(stage: bpy.types.Scene) -> bpy.types.Object:
     camera = bpy.data.objects.new("SEIP view", bpy.data.cameras.new("SEIP view"))
     stage.collection.objects.link(camera)
@@ -250,13 +222,12 @@ def _set_up(stage: bpy.types.Scene) -> None:
     render = stage.render
     render.engine = "CYCLES"
     render.resolution_percentage = 100
-    render.use_persistent_data = True  # between the pictures, which show the same objects
     render.image_settings.file_format = "PNG"
     render.image_settings.color_mode = "RGBA"
     render.film_transparent = True
     stage.view_settings.view_transform = "Standard"
     stage.cycles.device = "CPU"
-    stage.cycles.samples = sample_count()
+    stage.cycles.samples = min(SAMPLES, DENOISED_SAMPLES) if has_denoiser() else SAMPLES
     stage.cycles.seed = 0
     stage.cycles.use_adaptive_sampling = False
     stage.cycles.use_denoising = has_denoiser()
@@ -272,11 +243,6 @@ def has_denoiser() -> bool:
     except ImportError:
         return False
     return bool(getattr(cycles, "with_openimagedenoise", False))
-
-
-def sample_count() -> int:
-    """Return the number of samples of each pixel."""
-    return min(SAMPLES, DENOISED_SAMPLES) if has_denoiser() else SAMPLES
 
 
 def _hidden(stage: bpy.types.Scene, points: Float, viewpoint: Viewpoint) -> Boolean:

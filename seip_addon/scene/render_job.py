@@ -1,4 +1,4 @@
-"""Renders a scene's view in a Blender of its own; `render_elsewhere.render_elsewhere` starts it.
+"""Renders a scene's view in a Blender of its own; `render.render_elsewhere` starts it.
 
 blender -b --factory-startup -P render_job.py -- job.json
 """
@@ -14,16 +14,16 @@ import bpy
 
 
 def main(job: Path) -> None:
-    """Render what a job asks for, and write how each picture was taken."""
+    """Render the picture of a job, and write how it was taken."""
     request = json.loads(job.read_text())
     package = Path(__file__).resolve().parents[1]
     sys.path[:] = [str(package.parent), *request["path"]]
     render = import_module(f"{package.name}.scene.render")  # no extension is installed here
 
     bpy.ops.wm.open_mainfile(filepath=request["blend"], load_ui=False, use_scripts=False)
-    shots = [render.Shot.from_json(shot) for shot in request["shots"]]
-    taken = render.take(shots, bpy.data.scenes[request["scene"]], [Path(raw) for raw in request["raws"]])
-    Path(request["answer"]).write_text(json.dumps([one.as_json() for one in taken]))
+    shot, scene = render.Shot.from_json(request["shot"]), bpy.data.scenes[request["scene"]]
+    number, hidden = render.take(shot, scene, Path(request["raw"]))
+    Path(request["answer"]).write_text(json.dumps([number, hidden.tolist()]))
 
 
 if __name__ == "__main__":

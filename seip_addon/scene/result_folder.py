@@ -2,24 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterator, Mapping, Sequence
+from collections.abc import Generator, Iterator, Mapping
 from contextlib import closing, contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import bpy
-from PIL import Image
 
 from ..core.base.errors import SeipError
 from ..core.base.progress import Progress
 from ..core.choosing.placement.deployment import Deployment
 from ..core.choosing.placement.objective import Solution, placement_constraints
-from ..core.output.pictures.close_ups import draw_plans, save_close_ups
-from ..core.output.pictures.colours import Legend, packed_counts
+from ..core.output.pictures.colours import packed_counts
 from ..core.output.pictures.labelled_view import save_labelled_view
 from ..core.output.pictures.plan_view import save_plan_view
-from ..core.output.results.candidate_table import save_candidate_table
-from ..core.output.results.carla import save_carla_spawns
 from ..core.output.results.file_names import REPORT_FILES
 from ..core.output.results.geographic_files import LOCATED_FILES, located, save_geojson, save_kml
 from ..core.output.results.placement_record import PlacementRecord, save_placement
@@ -28,15 +24,13 @@ from ..core.site.site import Site
 from ..core.storage.files import digest, unfinished_name
 from ..core.workflows.survey import Survey
 from . import contract
-from .blend_file import save_blend
-from .gltf import save_glb
+from .blend_file import save_blend, save_glb
 from .pieces import tidy_pieces
-from .render import RenderedPictures
-from .render_elsewhere import render_elsewhere
+from .render import render_elsewhere
 from .write import shown_legend, write_result
 
 FILES = (
-    *("candidates.csv", "carla_spawn.json", "site.npz", "plan.png", "view.png", "sensors.png"),
+    *("site.npz", "plan.png", "view.png"),
     *("scene.glb", "placed.blend", "placement.json"),
 )
 """In the order in which they take their places: where ``placement.json`` stands, everything else does."""
@@ -106,15 +100,17 @@ def write_result_folder(
         tidy_pieces(scene)
         write_result(scene, site, deployment)
         _save_placed(part["placed.blend"], scene, site, deployment, record)
-        with TemporaryDirectory(prefix="seip-") as raw:
-            pictures = render_elsewhere(Path(raw), part["placed.blend"], scene.name, site, deployment)
-            with closing(pictures):
+        with TemporaryDirectory(prefix="seip-") as temporary:
+            raw, created = Path(temporary) / "view.png", record.times.created
+            rendering = render_elsewhere(raw, part["placed.blend"], scene.name, site, deployment)
+            with closing(rendering):
                 if render:
-                    next(pictures)  # starts the other Blender, which renders while this one writes
+                    next(rendering)  # starts the other Blender, which renders while this one writes
                 save_glb(part["scene.glb"], site.attribution)
-                plans = yield from write_tables(part, survey, solution, record)
-                rendered = (yield from pictures) if render else None
-            write_pictures(part, survey, record, deployment, plans, rendered, shown_legend(scene))
+                yield from write_tables(part, survey, solution, record)
+                if render:
+                    sight, legend = (yield from rendering), shown_legend(scene)
+                    save_labelled_view(part["view.png"], raw, site, deployment, legend, sight, created=created)
 
 
 def _save_placed(
@@ -131,14 +127,11 @@ def _save_placed(
 
 def write_tables(
     part: Mapping[str, Path], survey: Survey, solution: Solution, record: PlacementRecord
-) -> Generator[Progress, None, list[Image.Image]]:
-    """Write the files of a result that do not depend on Blender's data; return the plans of the sensors' close-ups."""
+) -> Generator[Progress, None, None]:
+    """Write the files of a result that do not depend on Blender's data."""
     geometry, site, models, deployment = survey.geometry, survey.site, survey.models, solution.deployment
-    yield Progress(0, 3, "writing tables", counted=False)
+    yield Progress(0, 2, "writing tables", counted=False)
     save_placement(part["placement.json"], record)
-    save_carla_spawns(part["carla_spawn.json"], deployment, site.origin)
-    yield Progress(1, 3, "writing tables", counted=False)
-    save_candidate_table(part["candidates.csv"], site, models, survey.grid.visible, deployment)
     problem = placement_constraints(site, models, solution.objective)
     save_site_file(part["site.npz"], record.inputs["visibility"], geometry, site, solution, problem)
     if site.attribution:
@@ -147,24 +140,6 @@ def write_tables(
     if placed is not None:
         save_geojson(part["placement.geojson"], placed)
         save_kml(part["placement.kml"], placed)
-    yield Progress(2, 3, "drawing the plan", counted=False)
+    yield Progress(1, 2, "drawing the plan", counted=False)
     created = record.times.created
     save_plan_view(part["plan.png"], geometry, site, deployment, solution.caption, created=created)
-    return draw_plans(geometry, site, deployment)
-
-
-def write_pictures(  # noqa: PLR0913, PLR0917  # what all pictures show
-    part: Mapping[str, Path],
-    survey: Survey,
-    record: PlacementRecord,
-    deployment: Deployment,
-    plans: Sequence[Image.Image],
-    rendered: RenderedPictures | None,
-    legend: Legend | None,
-) -> None:
-    """Write the rendered view with its labels, and the close-ups of the sensors; without rendering only their plans."""
-    site, created = survey.site, record.times.created
-    if rendered is not None:
-        save_labelled_view(part["view.png"], rendered.view, site, deployment, legend, rendered.sight, created=created)
-    views, places = ((), {}) if rendered is None else (rendered.close_ups, rendered.places)
-    save_close_ups(part["sensors.png"], plans, views, places, site.attribution)

@@ -11,7 +11,6 @@ import pytest
 from seip_addon.core.output.results.answer import sentence
 from seip_addon.core.site.installed_cost import load_installed_cost
 from seip_addon.core.site.obstruction import NO_OBSTACLES_MESSAGE
-from seip_addon.core.world.elevation.at_place import TerrainRequest
 from seip_addon.panel import placement
 from seip_addon.panel.session import session
 from seip_addon.scene import contract
@@ -102,9 +101,9 @@ def test_a_bad_map_is_one_sentence(scene, tmp_path):
 
 def test_further_files_are_those_of_the_request(scene):
     site = choose(scene)
-    site.terrain, site.terrain_epsg, site.osm = "/survey.laz", 25832, "/around.osm"
+    site.terrain, site.osm = "/ground.tif", "/around.osm"
     request = site.request()
-    assert request.terrain == TerrainRequest(MAP.joinpath("/survey.laz"), 25832)
+    assert request.terrain == MAP.joinpath("/ground.tif")
     assert request.osm == MAP.joinpath("/around.osm")
     site.terrain = site.osm = ""
     assert (site.request().terrain, site.request().osm) == (None, None)

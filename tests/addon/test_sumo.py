@@ -6,13 +6,13 @@ import bpy
 import pytest
 
 from seip_addon.core.programs import sumo_programs
-from seip_addon.core.programs.sumo_installation import SUMO_VERSION, sumo_size
+from seip_addon.core.programs.sumo_installation import DOWNLOAD_SIZE, SUMO_VERSION
 from seip_addon.panel import preferences, site
 from tests.builders.drawn_layout import DrawnLayout
 from tests.builders.osm_text import crossing
 from tests.builders.sumo_wheel import write_programs, write_wheel
 
-BUTTON = f"Install SUMO ({sumo_size().download} MB)"
+BUTTON = f"Install SUMO ({DOWNLOAD_SIZE} MB)"
 
 
 @pytest.fixture

@@ -23,7 +23,6 @@ from seip_addon.core.choosing.placement.problem import Placement
 from seip_addon.core.choosing.placement.returns_summary import CrossingReturns
 from seip_addon.core.choosing.placement.solver import front_of
 from seip_addon.core.geometry.geo_reference import GeoReference
-from seip_addon.core.output.pictures.close_ups import draw_plans, save_close_ups
 from seip_addon.core.output.pictures.plan_view import save_plan_view
 from seip_addon.core.output.results.placement_record import Provenance, placement_record, save_placement
 from seip_addon.core.output.results.site_file import save_site_file
@@ -102,7 +101,6 @@ def make_folder(
     VisibilityGrid(np.packbits(example.visible, axis=1), example.visible.shape, KEY, {}).save(folder / "visibility.npz")
     if pictures:
         save_plan_view(folder / "plan.png", example.geometry, example.site, deployment)
-        save_close_ups(folder / "sensors.png", draw_plans(example.geometry, example.site, deployment), (), {}, ())
     return example
 
 

@@ -1,11 +1,11 @@
 """Recordings of spinning LiDARs, simulated without the project's scanner: plain formulas for rays and surfaces."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from seip_addon.core.sensing.lidar.beams import BeamPattern
-from seip_addon.core.sensing.recordings.sweep import Sweep
+from seip_addon.core.sensing.recordings.sweep_files import Sweep
 
 CANYON = ((0, 35.0), (0, -25.0), (1, 12.0), (1, -28.0))
 """Walls of a square: axis and its coordinate, metres from the sensor."""
@@ -23,13 +23,13 @@ class MemoryRecord:
         return len(self.sweeps)
 
     def sweep(self, number):
-        return replace(self.sweeps[number], time=float(self.times[number]))
+        return self.sweeps[number]
 
 
 def memory_record(name, clouds, rate=10.0, intensities=None):
     """Return the record of clouds (n, 3) in the sensor's axes."""
     intensities = intensities or [None] * len(clouds)
-    sweeps = tuple(Sweep(None, cloud, intensity) for cloud, intensity in zip(clouds, intensities, strict=True))
+    sweeps = tuple(Sweep(cloud, intensity) for cloud, intensity in zip(clouds, intensities, strict=True))
     return MemoryRecord(name, sweeps, np.arange(len(clouds)) / rate)
 
 

@@ -1,8 +1,7 @@
 """What a detector's file holds is checked once, where it is read."""
 
-from headless.detection.detector import Detector, TrainingRecord, save_state
+from headless.detection.detector import Detector, TrainingRecord, save_state, suitability_warnings
 from headless.detection.settings import NetworkSettings
-from headless.detection.suitability import suitability_warnings
 
 import pytest
 import torch

@@ -8,7 +8,6 @@ import pytest
 
 from seip_addon.core.base.errors import SeipError
 from seip_addon.core.world.openstreetmap.network_map import read_network_map
-from seip_addon.scene import contract
 from seip_addon.scene.read import read_scene
 from tests.builders.dem_files import origin_at, sampled, write_dem
 from tests.builders.opendrive_text import document, geometry, lane, road, section
@@ -59,19 +58,6 @@ def test_a_mistake_leaves_nothing_behind(more, complaint, street, tmp_path, monk
     with pytest.raises(SeipError, match=complaint):
         build(street, tmp_path, *more)
     assert set(tmp_path.iterdir()) == before
-
-
-def test_objects_of_a_survey_stand_in_the_scene(street, tmp_path):
-    pytest.importorskip("laspy")
-    pytest.importorskip("lazrs")
-    from seip_addon.core.geometry.geo_reference import projection  # noqa: PLC0415
-    from tests.builders.survey_files import block_points, ground_points, write_survey  # noqa: PLC0415
-
-    rng = np.random.default_rng(7)
-    points = np.concatenate([ground_points(rng, lambda x, y: 0 * x, 130), block_points(rng, 5, 12, 10, 8, 9.0)])
-    survey = write_survey(tmp_path / "survey.laz", points, (X, Y), projection("EPSG:25833").wkt)
-    scene = build(street, tmp_path, "--terrain", survey)
-    assert [obj.name for obj in scene.objects if obj.get(contract.SOURCE) == "survey"] == ["Surveyed building 1"]
 
 
 @needs_sumo

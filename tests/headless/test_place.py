@@ -1,6 +1,5 @@
 """The place command, from a scene to its folder of results, and what it says when it cannot."""
 
-import csv
 import json
 import os
 import signal
@@ -20,6 +19,7 @@ import pytest
 from seip_addon.core.base.errors import SeipError
 from seip_addon.core.choosing.placement.objective import ACCEPTED_MESSAGE
 from seip_addon.core.output.results.placement_record import comparable, load_placement
+from seip_addon.core.output.results.site_file import load_site_file
 
 ROOT = Path(__file__).resolve().parents[2]
 SCENE = ROOT / "scenes" / "junction.blend"
@@ -46,13 +46,10 @@ def test_the_folder_holds_every_result(folder):
     names = {path.name for path in folder.iterdir()}
     assert names == {
         "placement.json",
-        "candidates.csv",
         "visibility.npz",
-        "carla_spawn.json",
         "site.npz",
         "scene.glb",
         "plan.png",
-        "sensors.png",
         "placed.blend",
     }
 
@@ -81,11 +78,12 @@ def test_sensors_that_are_not_at_a_position_are_not_kept(small_scene, folder, tm
 
 def test_tables_agree_with_the_record(folder):
     record = load_placement(folder / "placement.json")
-    rows = list(csv.DictReader((folder / "candidates.csv").read_text(encoding="utf-8").splitlines()))
-    assert len(rows) == record.counts.poses
-    chosen = {int(row["pose"]) for row in rows if row["chosen"]}
-    assert chosen == {sensor.pose for sensor in record.sensors}
-    assert len(json.loads((folder / "carla_spawn.json").read_text(encoding="utf-8"))) == len(record.sensors)
+    site = load_site_file(folder / "site.npz")
+    assert len(site.problem.prices) == record.counts.poses
+    assert [site.problem.labels[sensor.pose] for sensor in record.sensors] == [one.sensor for one in record.sensors]
+    assert [site.problem.xyz[sensor.pose] for sensor in record.sensors] == [
+        pytest.approx(one.local_m, abs=1e-6) for one in record.sensors
+    ]
 
 
 def test_the_saved_scene_holds_the_sensors(folder):
@@ -107,7 +105,7 @@ def test_the_glb_holds_the_sensors_and_the_coverage(folder):
 def test_the_same_run_gives_the_same_bytes(folder, tmp_path, run):
     again = run(tmp_path / "again", "--count", "2")
     assert comparable(again) == comparable(load_placement(folder / "placement.json"))
-    for name in ("candidates.csv", "carla_spawn.json", "site.npz", "scene.glb", "plan.png"):
+    for name in ("site.npz", "scene.glb", "plan.png"):
         assert (tmp_path / "again" / name).read_bytes() == (folder / name).read_bytes()
 
 
@@ -141,9 +139,6 @@ def test_tilts_are_given_in_degrees_and_stand_with_each_sensor(folder, tmp_path,
     upright = load_placement(folder / "placement.json")
     assert record.counts.poses == 4 * upright.counts.poses
     assert record.coverage.whole > upright.coverage.whole
-    spawned = json.loads((tmp_path / "carla_spawn.json").read_text(encoding="utf-8"))
-    pitches = [entry["transform"]["rotation"]["pitch"] for entry in spawned]
-    assert pitches == [-sensor.tilt_deg + 0.0 for sensor in record.sensors]
 
 
 CORNER = """
@@ -167,13 +162,8 @@ def test_a_sensor_that_looks_one_way_is_turned_where_it_sees_most(tmp_path, run)
     mine = ["--catalogue", str(tmp_path / "mine.toml"), "--sensor", "corner", "--count", "2"]
     several = run(tmp_path, *mine)
     assert several.settings["candidates"]["yaws"] == 8
-    rows = list(csv.DictReader((tmp_path / "candidates.csv").read_text(encoding="utf-8").splitlines()))
-    spawned = json.loads((tmp_path / "carla_spawn.json").read_text(encoding="utf-8"))
-    for sensor, spawn in zip(several.sensors, spawned, strict=True):
-        assert float(rows[sensor.pose]["yaw_deg"]) == pytest.approx(sensor.yaw_deg, abs=1e-3)
-        assert (spawn["transform"]["rotation"]["yaw"] + sensor.yaw_deg) % 360 == pytest.approx(0.0, abs=1e-5)
-        assert spawn["attributes"]["horizontal_fov"] == "100"
-    assert len({row["yaw_deg"] for row in rows if row["position"] == several.sensors[0].position}) > 2
+    assert not any(sensor.all_round for sensor in several.sensors)
+    assert {round(sensor.yaw_deg, 3) % 45.0 for sensor in several.sensors} == {0.0}
 
 
 @pytest.mark.parametrize(

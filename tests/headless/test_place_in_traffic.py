@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from seip_addon.core.choosing.placement.scenarios import DEFAULT_COUNTS
-from seip_addon.core.output.results.file_names import TRAFFIC_PICTURES
+from seip_addon.core.output.results.file_names import TRAFFIC_PICTURE
 from seip_addon.core.sensing.traffic.trajectories import RoadUser, Trajectories
 from seip_addon.scene.result_folder import FILES
 from tests.builders.small_junction import ORIGIN
@@ -44,7 +44,7 @@ def trajectories(path, *, x=0.0, end=30.0):
 def test_it_writes_a_result_and_says_what_traffic_hides(tmp_path, capsys, run):
     run(tmp_path, "--count", "2")
     names = {path.name for path in tmp_path.iterdir()}
-    assert {*FILES, *TRAFFIC_PICTURES, "visibility.npz"} - {"view.png"} <= names
+    assert {*FILES, TRAFFIC_PICTURE, "visibility.npz"} - {"view.png"} <= names
     record = json.loads((tmp_path / "placement.json").read_text(encoding="utf-8"))
     goal, notes = record["settings"]["goal"], record["notes"]
     assert goal["scenarios"]["kind"] == "traffic"

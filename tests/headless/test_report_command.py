@@ -2,20 +2,14 @@
 
 import io
 import json
-import shlex
 from contextlib import redirect_stdout
-from dataclasses import replace
 
 from headless import place, report
-from headless import survey as surveys
-from headless.place import read_objective
 
 import bpy
 import pytest
 
-from seip_addon.core.output.report.repeat import repeating_command
 from seip_addon.core.output.results.placement_record import load_placement
-from seip_addon.core.storage.json_dataclass import as_json
 from seip_addon.scene import contract
 from seip_addon.scene.blend_file import open_blend, save_blend
 
@@ -80,26 +74,3 @@ def test_the_record_and_the_maps_agree(folder):
     assert record.settings["installed_cost"]["new_post_usd"] > 0
     assert all(one.installation_usd > 0 for one in record.sensors)
     assert not any("not written" in note for note in record.notes)
-
-
-@pytest.mark.parametrize(
-    "typed",
-    [
-        ["--budget", "60000", "--heights", "4:5:0.5", "--tilts", "-5", "0", "10", "--allow", "assumed-poles"],
-        ["--weather", "rain=10", "visibility=200", "wet", "--weighted"],
-        ["--pose-errors", "0.2", "3.5", "--seed", "2", "--risk", "worst", "--failures", "mean", "--count", "3"],
-        [],
-    ],
-)
-def test_every_option_survives_the_record(folder, typed):
-    parse = place._parser().parse_args  # noqa: SLF001  # what the command itself reads options with
-    asked = parse(["a.blend", "-o", "out", *typed])
-    settings = surveys.read_survey_settings(asked)
-    goal = read_objective(asked)
-    recorded = {**settings.as_record(), "goal": as_json(goal), "render": not asked.no_render}
-    record = replace(load_placement(folder / "placement.json"), settings=json.loads(json.dumps(recorded)))
-    words = shlex.split(repeating_command(record))
-    again = parse(words[2:])
-    assert surveys.read_survey_settings(again) == settings
-    assert read_objective(again) == goal
-    assert again.no_render == asked.no_render

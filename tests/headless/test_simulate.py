@@ -17,6 +17,7 @@ from seip_addon.core.sensing.scans.run_folder import load_frames
 from seip_addon.core.sensing.traffic.trajectories import RoadUser, Trajectories
 from seip_addon.scene import contract
 from seip_addon.scene.blend_file import save_blend
+from seip_addon.scene.traffic import animate
 from seip_addon.scene.write import write_result
 from tests.builders.scene_by_hand import make_scene
 from tests.builders.small_junction import ORIGIN, make_example
@@ -133,3 +134,14 @@ def test_a_scene_without_sensors_or_traffic_has_its_sentence(folder):
         )
     with pytest.raises(SeipError, match="no traffic"):
         simulate.main([str(folder / "placed.blend"), "-o", str(folder / "wrong")])
+
+
+@pytest.mark.slow
+def test_traffic_that_is_animated_in_the_scene_is_simulated(folder):
+    bpy.ops.wm.open_mainfile(filepath=str(folder / "placed.blend"))
+    animate(bpy.context.scene, make_traffic().moved_to(ORIGIN))
+    save_blend(folder / "animated.blend")
+    simulate.main([str(folder / "animated.blend"), "-o", str(folder / "animated"), *QUICK])
+    frames = [frame for _, frame in load_frames(folder / "animated")]
+    moved = [frame.labels.centre[frame.labels.category == "car"][0, 0] for frame in frames]
+    assert np.diff(moved) == pytest.approx([2.0, 2.0], abs=0.01)

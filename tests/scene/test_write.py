@@ -9,11 +9,11 @@ import pytest
 from seip_addon.core.choosing.placement.deployment import deploy
 from seip_addon.core.output.pictures import labelled_view
 from seip_addon.core.output.pictures.colours import colouring
+from seip_addon.core.output.pictures.viewpoint import Sight
 from seip_addon.scene import contract
-from seip_addon.scene.coverage_colours import colour_coverage
 from seip_addon.scene.materials import linear
-from seip_addon.scene.render import labelled_pictures, raw_files, shots_of, take
-from seip_addon.scene.write import LIFT, clear_result, shown_legend, write_result
+from seip_addon.scene.render import shot_of, take
+from seip_addon.scene.write import LIFT, clear_result, colour_coverage, shown_legend, write_result
 from tests.builders.scene_by_hand import make_scene
 
 
@@ -110,28 +110,24 @@ def test_a_second_result_replaces_the_first(example, scene):
 def save_rendered_view(path, scene, site, deployment):
     """Render and label the view as `write_result_folder` does."""
     with TemporaryDirectory() as folder:
-        shots = shots_of(site, deployment)
-        raws = raw_files(Path(folder), shots)
-        taken = labelled_pictures(shots, take(shots, scene, raws), raws, site, deployment)
-        labelled_view.save_labelled_view(path, taken.view, site, deployment, shown_legend(scene), taken.sight)
-    return taken
+        shot, raw = shot_of(site, deployment), Path(folder) / "raw.png"
+        number, hidden = take(shot, scene, raw)
+        view = shot.viewpoints[number]
+        sight = Sight(view.project(shot.sensors), hidden, view.project(site.targets.xyz))
+        labelled_view.save_labelled_view(path, raw, site, deployment, shown_legend(scene), sight)
 
 
 def test_the_rendered_view_changes_nothing_in_the_file(example, scene, tmp_path, monkeypatch):
     monkeypatch.setattr("seip_addon.scene.render.SAMPLES", 1)
     monkeypatch.setattr("seip_addon.scene.render.WIDTH", 480)
     monkeypatch.setattr("seip_addon.scene.render.HEIGHT", 270)
-    monkeypatch.setattr("seip_addon.scene.render.TILE", (64, 48))
     write_result(scene, example.site, example.deployment)
     bpy.context.view_layer.update()
     everything = [bpy.data.objects, bpy.data.meshes, bpy.data.scenes, bpy.data.worlds, bpy.data.cameras]
     everything += [bpy.data.lights, bpy.data.images, bpy.data.collections]
     counts, users, kept = [len(data) for data in everything], fingerprint(scene.objects), settings_of(scene)
     for name in ("a.png", "b.png"):
-        taken = save_rendered_view(tmp_path / name, scene, example.site, example.deployment)
-    assert list(taken.places) == ["S1", "S2", "S3"]
-    assert all(0.05 < share < 0.95 for place in taken.places.values() for share in place)
-    assert len({picture.tobytes() for picture in taken.close_ups}) == 3
+        save_rendered_view(tmp_path / name, scene, example.site, example.deployment)
     assert [len(data) for data in everything] == counts
     assert fingerprint(scene.objects) == users
     assert settings_of(scene) == kept
@@ -165,9 +161,9 @@ def test_coverage_is_recoloured_from_the_mesh_alone(example, scene):
 def test_the_view_is_from_a_side_without_towers(example, scene, tmp_path, monkeypatch):
     monkeypatch.setattr("seip_addon.scene.render.WIDTH", 48)
     monkeypatch.setattr("seip_addon.scene.render.HEIGHT", 27)
-    (whole, *_) = shots_of(example.site, example.deployment)
+    shot = shot_of(example.site, example.deployment)
     middle = example.site.targets.xyz.mean(axis=0)
-    nearest = whole.viewpoints[0].place - middle
+    nearest = shot.viewpoints[0].place - middle
     towards = nearest[:2] / np.hypot(*nearest[:2])
     # A wall beside the road that the nearest viewpoint would look at from behind.
     reach = np.abs((example.site.targets.xyz - middle)[:, :2] @ towards).max() + 5.0
@@ -176,10 +172,9 @@ def test_the_view_is_from_a_side_without_towers(example, scene, tmp_path, monkey
     corners = [(*(foot + side * along), z) for side, z in ((-1, -5.0), (1, -5.0), (1, 150.0), (-1, 150.0))]
     mesh = bpy.data.meshes.new("Tower")
     mesh.from_pydata(corners, [], [(0, 1, 2, 3)])
-    raws = raw_files(tmp_path, [whole])
-    (open_air,) = take([whole], scene, raws)
+    open_air, _ = take(shot, scene, tmp_path / "open.png")
     scene.collection.objects.link(bpy.data.objects.new("Tower", mesh))
     bpy.context.view_layer.update()
-    (walled,) = take([whole], scene, raws)
-    assert open_air.viewpoint == 0
-    assert (whole.viewpoints[walled.viewpoint].place - middle)[:2] @ towards < 0.0
+    walled, _ = take(shot, scene, tmp_path / "walled.png")
+    assert open_air == 0
+    assert (shot.viewpoints[walled].place - middle)[:2] @ towards < 0.0

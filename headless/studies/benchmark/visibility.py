@@ -9,8 +9,9 @@ from functools import partial
 from headless.studies.benchmark.resource_usage import Expense
 
 import numpy as np
+import shapely
 
-from seip_addon.core.base.arrays import Boolean
+from seip_addon.core.base.arrays import Boolean, Float, Integer
 from seip_addon.core.base.errors import SeipError
 from seip_addon.core.geometry.orientation import orientation as orientation_of
 from seip_addon.core.sensing.lidar.beams import BeamPattern
@@ -18,9 +19,8 @@ from seip_addon.core.sensing.lidar.model import LidarModel
 from seip_addon.core.sensing.visibility.grid import seen_from
 from seip_addon.core.sensing.visibility.near_surfaces import NearSurfaces, near_surfaces, rotated_surfaces
 from seip_addon.core.sensing.visibility.ray_casting import make_ray_caster
-from seip_addon.core.sensing.visibility.scanning import ScanPosition
+from seip_addon.core.sensing.visibility.scanning import ScanPosition, is_within, squared_length
 from seip_addon.core.sensing.visibility.settings import Engine, VisibilitySettings
-from seip_addon.core.sensing.visibility.target_index import TargetIndex
 from seip_addon.core.sensing.visibility.visibility_model import VisibilityModel, is_upright, yaw_of
 from seip_addon.core.site.site import Site
 
@@ -108,13 +108,27 @@ def _full_and_lazy(
 
 def seen_by_all_rays(position: ScanPosition, surfaces: NearSurfaces) -> tuple[Boolean, int]:
     """Find the targets that are seen by casting every ray: the reference."""
-    pattern, index = BeamPattern(position.model, position.yaw), TargetIndex(surfaces.xyz, position.settings.delta)
+    pattern, delta = BeamPattern(position.model, position.yaw), position.settings.delta
     rays = np.arange(position.model.channels * position.model.azimuth_count)
     seen = np.zeros(len(surfaces.xyz), dtype=bool)
     for begin in range(0, len(rays), RAYS_AT_ONCE):
         directions = pattern.directions(rays[begin : begin + RAYS_AT_ONCE])
-        seen[position.pairs_seen(directions, *position.cast(directions), surfaces, index)[1]] = True
+        distance, triangle = position.cast(directions)
+        returns = np.flatnonzero(position.counting(directions, distance, triangle))
+        directions, distance = directions[returns], distance[returns]
+        # a return may see several targets, and the strength at borders depends on the target's surfaces: pairs of both
+        ray, target = pairs_within(position.origin + distance[:, None] * directions, surfaces.xyz, delta)
+        strong = position.counting_at_borders(surfaces, directions[ray], distance[ray], target)
+        seen[target[strong]] = True
     return seen, len(rays)
+
+
+def pairs_within(points: Float, targets: Float, delta: float) -> tuple[Integer, Integer]:
+    """Return each of some points (n, 3) with each target (t, 3) that is nearer than δ to it, points ascending."""
+    tree = shapely.STRtree(shapely.points(targets[:, :2]))
+    point, target = tree.query(shapely.points(points[:, :2]), predicate="dwithin", distance=delta * (1 + 1e-6))
+    near = is_within(squared_length(points[point] - targets[target]), delta)
+    return point[near], target[near]
 
 
 def seen_by_tilted_full_scan(position: ScanPosition, tilt: float, surfaces: NearSurfaces) -> tuple[Boolean, int]:

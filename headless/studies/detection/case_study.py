@@ -19,7 +19,7 @@ from headless.detection.frames import LazyFrames, Recording, SampledRecording
 from headless.detection.recordings import MountedSensors, SampledRun, Simulator, poses_key, sampled_runs
 from headless.detection.rules import MAIN_RULE
 from headless.detection.settings import NetworkSettings, TrainingSettings
-from headless.detection.training import LearningCurve, TrainedDetector, deterministic, train
+from headless.detection.training import LearningCurve, TrainedDetector, make_deterministic, train
 from headless.studies.coverage.cells import COUNTS, Case, Cell, solve_cell
 
 import numpy as np
@@ -261,8 +261,7 @@ def train_all(  # noqa: PLR0913  # what a training depends on
         )
         for seed in range(1, seeds + 1)
     ]
-    with deterministic(training.threads):  # around all trainings, as torch has one setting for all threads
-        return (yield from side_by_side(trainings, AT_ONCE if device == "cpu" else 1))
+    return (yield from side_by_side(trainings, AT_ONCE if device == "cpu" else 1))
 
 
 def still_rises(curve: LearningCurve) -> bool:
@@ -286,9 +285,9 @@ def evaluate_all(
         CPU threads of torch; their number affects the exact result.
     """
     runs, detectors = (*traffic.validation, *traffic.test), [one.detector for one in trained]
-    detections = [detect_in_runs(simulator, one, runs, detectors, threads) for one in configurations]
-    with deterministic(threads):  # around all detections, as torch has one setting for all threads
-        results = yield from side_by_side(detections, AT_ONCE)
+    detections = [detect_in_runs(simulator, one, runs, detectors) for one in configurations]
+    make_deterministic(threads)
+    results = yield from side_by_side(detections, AT_ONCE)
     validated = sum(len(run.times) for run in traffic.validation)
     outcomes = []
     for number, detector in enumerate(trained):

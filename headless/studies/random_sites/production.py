@@ -22,7 +22,6 @@ from seip_addon.core.workflows.site_building import SiteRequest, build_site, sav
 from seip_addon.core.workflows.survey import lay_out
 from seip_addon.core.workflows.survey_settings import SurveySettings
 from seip_addon.core.workflows.traffic_runs import traffic_folder
-from seip_addon.core.world.elevation.at_place import TerrainRequest
 from seip_addon.core.world.traffic_simulation.simulation import Scenario, simulate_run
 from seip_addon.scene.blend_file import new_file, save_blend
 from seip_addon.scene.build import build_scene
@@ -138,7 +137,7 @@ def _build(folder: Path, plan: StreetPlan) -> Generator[Progress, None, SceneGeo
     request = SiteRequest(
         near_latlon=(LATITUDE, LONGITUDE),
         approaches=APPROACHES,
-        terrain=TerrainRequest(terrain),
+        terrain=terrain,
         left_hand=plan.left_hand,
     )
     built = yield from build_site(extract, request)

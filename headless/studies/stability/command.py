@@ -180,14 +180,10 @@ def traffic(scene: StudiedScene) -> Generator[Progress, None, Chapter]:
     deployment = survey.deploy(study.robust.placement.chosen)
     title = f"{scene.placed} in traffic"
     robustness_charts.save_time_map(scene.charts / "time_seen.png", survey, deployment, study.robust, title)
-    robustness_charts.save_traffic_chart(scene.charts / "promise.png", study, scene.placed, title)
     return Chapter(
         f"Occlusion by traffic: {scene.placed}",
         traffic_rows(study),
-        {
-            "time_seen.png": "Share of time for which each target, and the point above it, is visible in traffic",
-            "promise.png": "Coverage of placements on the empty road and, on average over time, in traffic",
-        },
+        {"time_seen.png": "Share of time for which each target, and the point above it, is visible in traffic"},
     )
 
 

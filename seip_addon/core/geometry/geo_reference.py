@@ -12,11 +12,6 @@ _SEMI_MAJOR_AXIS, _FLATTENING = 6_378_137.0, 1 / 298.257223563  # of WGS 84; GRS
 _THIRD_FLATTENING = _FLATTENING / (2 - _FLATTENING)
 _ECCENTRICITY = math.sqrt(_FLATTENING * (2 - _FLATTENING))
 _RADIUS = _SEMI_MAJOR_AXIS / (1 + _THIRD_FLATTENING) * (1 + _THIRD_FLATTENING**2 / 4 + _THIRD_FLATTENING**4 / 64)
-_GEOGRAPHIC_WKT = (
-    'GEOGCS["WGS 84",DATUM["WGS_1984",SPHEROID["WGS 84",6378137,298.257223563,AUTHORITY["EPSG","7030"]],'
-    'AUTHORITY["EPSG","6326"]],PRIMEM["Greenwich",0,AUTHORITY["EPSG","8901"]],'
-    'UNIT["degree",0.0174532925199433,AUTHORITY["EPSG","9122"]],AUTHORITY["EPSG","4326"]]'
-)
 _SOUTHERN_NORTHING = 10_000_000.0  # false northing of southern UTM zones, metres
 _NEWTON_STEPS = 5  # two reach full precision away from the poles
 _UTM = re.compile(r"EPSG:+(258|326|327)(\d\d)\b", re.IGNORECASE)
@@ -75,25 +70,6 @@ class TransverseMercator:
         number = round((math.degrees(self.longitude) + 183) / 6)
         zones = (f"{number}{'S' if south else 'N'}" for south in (False, True) if self == _utm(number, south=south))
         return next(zones, "")
-
-    @property
-    def wkt(self) -> str:
-        """The projected reference system as well-known text 1 (OGC 01-009), as stored in LAS files."""
-        name, authority = "Transverse Mercator", ""
-        if self.zone:
-            name, authority = f"UTM zone {self.zone}", f',AUTHORITY["EPSG","{_epsg(self.zone)}"]'
-        parameters = {
-            "latitude_of_origin": round(math.degrees(self.latitude), 12),
-            "central_meridian": round(math.degrees(self.longitude), 12),
-            "scale_factor": self.scale,
-            "false_easting": self.false_easting,
-            "false_northing": self.false_northing,
-        }
-        given = "".join(f'PARAMETER["{key}",{value!r}],' for key, value in parameters.items())
-        return (
-            f'PROJCS["WGS 84 / {name}",{_GEOGRAPHIC_WKT},PROJECTION["Transverse_Mercator"],{given}'
-            f'UNIT["metre",1,AUTHORITY["EPSG","9001"]],AXIS["Easting",EAST],AXIS["Northing",NORTH]{authority}]'
-        )
 
     def _on_sphere(self, latitude: float, east: float) -> tuple[float, float]:
         n = _THIRD_FLATTENING

@@ -107,15 +107,6 @@ def beside(line: Float, aside: float) -> Float:
     return moved
 
 
-def covered_share(area: BaseGeometry, others: shapely.STRtree) -> float:
-    """Return the share of an area in plan that others cover together."""
-    over = others.geometries.take(others.query(area, predicate="intersects"))
-    if not len(over) or area.area <= 0.0:
-        return 0.0
-    common = area.buffer(0).intersection(shapely.union_all(shapely.buffer(over, 0)))
-    return float(common.area / area.area)
-
-
 def plane_height(triangles: Float, plan: Float) -> Float:
     """Return the height (n,) of each triangle's plane (n, 3, 3) at its point in plan (n, 2)."""
     normal = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])

@@ -1,11 +1,9 @@
 """Installation of SUMO with pip into a folder of its own, for a Blender without it."""
 
-import os
 import re
 import shutil
 import sys
 from collections.abc import Generator, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -20,23 +18,8 @@ SUMO_VERSION = "1.28.0"
 BY_HAND = "install Eclipse SUMO yourself and name its folder in the preferences of the extension"
 
 _ERROR = re.compile(r"^ERROR: (.+)$", re.MULTILINE)
-_MEGABYTE = 1_000_000
-
-
-@dataclass(frozen=True)
-class SumoSize:
-    """Size of SUMO on a platform: of its wheel and of what the wheel holds, megabytes."""
-
-    download: int
-    unpacked: int
-
-
-_SIZES = {"linux": SumoSize(149, 460), "win32": SumoSize(158, 470), "darwin": SumoSize(55, 181)}
-
-
-def sumo_size(platform: str = sys.platform) -> SumoSize:
-    """Return the size of SUMO on a platform, named as in `sys.platform`."""
-    return _SIZES.get(platform, _SIZES["linux"])
+DOWNLOAD_SIZE = {"win32": 158, "darwin": 55}.get(sys.platform, 149)
+"""Size of its wheel, megabytes."""
 
 
 def installed_sumo(folder: Path) -> Path:
@@ -57,7 +40,7 @@ def install_sumo(pip: Sequence[str], folder: Path) -> Generator[Progress, None, 
     Yields
     ------
     Progress
-        Progress in megabytes. Closing the generator ends pip and leaves the folder as it was.
+        Ten times a second. Closing the generator ends pip and leaves the folder as it was.
 
     Raises
     ------
@@ -69,10 +52,11 @@ def install_sumo(pip: Sequence[str], folder: Path) -> Generator[Progress, None, 
         new, log = Path(temporary) / "sumo", Path(temporary) / "log"
         options = ["--no-deps", "--only-binary", ":all:", "--no-compile", "--no-cache-dir", "--no-input", "-q"]
         command = [*pip, "install", f"eclipse-sumo=={SUMO_VERSION}", "--target", str(new), *options]
-        # pip downloads to the folder for temporary files, so that the size of ours shows how far it is
+        # pip downloads to the folder for temporary files, so that nothing is left if it is ended
         variables = dict.fromkeys(("TMPDIR", "TEMP", "TMP"), temporary)
+        working = Progress(0, 0, f"installing SUMO, {DOWNLOAD_SIZE} MB")
         try:
-            status = yield from run_logged(command, log, lambda _: _progress(Path(temporary)), environment=variables)
+            status = yield from run_logged(command, log, lambda _: working, environment=variables)
         except OSError as error:
             raise SeipError(f"{pip[0]} cannot be started ({error.strerror}): {BY_HAND}") from error
         if status != 0:
@@ -84,26 +68,6 @@ def install_sumo(pip: Sequence[str], folder: Path) -> Generator[Progress, None, 
                 shutil.rmtree(old)
         new.replace(installed_sumo(folder))
     return find_sumo([installed_sumo(folder)])
-
-
-def _progress(temporary: Path) -> Progress:
-    """Return how far pip is, from the size of the files that it has written so far."""
-    size, written = sumo_size(), _megabytes(temporary)
-    if written < size.download:
-        return Progress(written, size.download, f"downloading SUMO, {size.download} MB")
-    done = min(written - size.download, size.unpacked)
-    return Progress(done, size.unpacked, f"unpacking SUMO, {size.unpacked} MB")
-
-
-def _megabytes(folder: Path) -> int:
-    total = 0
-    for parent, _, names in os.walk(folder):  # passes over folders that pip removes in the meantime
-        for name in names:
-            try:
-                total += (Path(parent) / name).stat().st_size
-            except OSError:  # pip has moved it
-                continue
-    return total // _MEGABYTE
 
 
 def _failure(output: str, status: int) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal
@@ -15,11 +14,10 @@ from ..base.arrays import Float
 from ..base.counts import counted
 from ..base.errors import SeipError
 from ..base.progress import Progress
-from ..geometry.plan import heights_over, outline, signed_area, surface_height
+from ..geometry.plan import outline, signed_area, surface_height
 from ..storage.files import digest
 from .scene_geometry import ASSUMED, Pole, SceneGeometry
 from .site import Site
-from .targets import generate_targets
 
 MAX_ORIGIN_DISTANCE = 10_000.0
 """Metres from the origin beyond which Blender's single precision rounds coordinates to a millimetre and more."""
@@ -35,13 +33,6 @@ MAX_HOLE_AREA = 10.0
 """Square metres in plan up to which a hole in the road is a missing face rather than an island."""
 MIN_HOLE_AREA = 0.01
 """Square metres in plan below which a hole is a seam."""
-MAX_ROAD_STEP = 0.3
-"""Height difference over one metre of road (metres) that vehicles cannot pass."""
-LAYER_DISTANCES = (0.05, 2.5)
-"""Heights (metres) of one road above another that indicate a mistake instead of a bridge."""
-SAMPLE_SPACING = 1.0
-"""Metres between the samples of the road."""
-MAX_SAMPLES = 250_000
 SAME_POLE_DISTANCE = 0.05
 """Metres in plan within which two poles count as being in one place."""
 MAX_NAMED = 5
@@ -59,7 +50,7 @@ ROLES = {
     "mandatory_areas": "Mandatory areas",
 }
 """Roles of surfaces, with their titles."""
-STAGES = 6
+STAGES = 5
 
 
 @dataclass(frozen=True)
@@ -161,10 +152,8 @@ def check_site(
         plans[role] = outline(np.concatenate([np.empty((0, 3, 3)), *_triangles(contents, role)]))
     yield Progress(3, STAGES, "problems", counted=False)
     problems = [*contents.problems, *_problems(contents, plans)]
-    yield Progress(4, STAGES, "road", counted=False)
-    problems += _road_problems(contents, plans)
     counts = _counts(contents, plans)
-    yield Progress(5, STAGES, "candidates", counted=False)
+    yield Progress(4, STAGES, "candidates", counted=False)
     if contents.geometry is not None:
         try:
             site, warnings = lay_out(contents.geometry)
@@ -240,6 +229,7 @@ def _problems(contents: SceneContents, plans: dict[str, BaseGeometry]) -> Iterat
     yield from _without_road(contents, plans)
     yield from _pole_problems(contents, plans["region"])
     yield from _duplicates(contents)
+    yield from _holes(contents, plans)
 
 
 def _missing(contents: SceneContents, plans: dict[str, BaseGeometry]) -> Iterator[Problem]:
@@ -402,24 +392,8 @@ def _duplicates(contents: SceneContents) -> Iterator[Problem]:
         first.setdefault(key, surface.name)
 
 
-def _road_problems(contents: SceneContents, plans: dict[str, BaseGeometry]) -> Iterator[Problem]:
-    """Find problems of the road within the region: holes, steps, and roads close above each other."""
+def _holes(contents: SceneContents, plans: dict[str, BaseGeometry]) -> Iterator[Problem]:
     region, road = plans["region"], plans["roads"]
-    within = region.intersection(road)
-    if within.area == 0:
-        return
-    yield from _holes(contents, road, region)
-    triangles = np.concatenate(_triangles(contents, "roads"))
-    spacing = max(SAMPLE_SPACING, math.sqrt(region.area / MAX_SAMPLES))
-    try:
-        places = generate_targets(region, triangles, spacing).xyz
-    except SeipError:  # too narrow for the grid: steps cannot be checked
-        return
-    yield from _steps(contents, places, spacing)
-    yield from _layers(contents, places, triangles)
-
-
-def _holes(contents: SceneContents, road: BaseGeometry, region: BaseGeometry) -> Iterator[Problem]:
     rings = [ring for part in shapely.get_parts(road) if part.geom_type == "Polygon" for ring in part.interiors]
     areas = [shapely.Polygon(ring) for ring in rings]
     holes = [hole for hole in areas if MIN_HOLE_AREA < hole.area <= MAX_HOLE_AREA and hole.intersects(region)]
@@ -430,38 +404,6 @@ def _holes(contents: SceneContents, road: BaseGeometry, region: BaseGeometry) ->
             f"The road has {counted(len(holes), 'hole')} of up to {largest.area:.2g} m², as at {_place(largest)}: "
             "there are no targets in them; add the missing faces, unless they are islands.",
             _nearest_road(contents, largest),
-        )
-
-
-def _steps(contents: SceneContents, places: Float, spacing: float) -> Iterator[Problem]:
-    tree = shapely.STRtree(shapely.points(places[:, :2]))
-    pairs = tree.query(shapely.points(places[:, :2]), predicate="dwithin", distance=1.1 * spacing)
-    first, second = pairs[:, pairs[0] < pairs[1]]
-    rise = np.abs(places[first, 2] - places[second, 2])
-    steep = np.flatnonzero(rise > MAX_ROAD_STEP * spacing)
-    if len(steep):
-        worst = steep[np.argmax(rise[steep])]
-        point = shapely.Point(places[first[worst], :2])
-        yield Problem(
-            "WARNING",
-            f"The road has steps or slopes over {MAX_ROAD_STEP:.0%} at {counted(len(steep), 'place')}, up to "
-            f"{rise[worst]:.2g} m at {_place(point)}: targets there may be off the road, except at a bridge's edge.",
-            _nearest_road(contents, point),
-        )
-
-
-def _layers(contents: SceneContents, places: Float, triangles: Float) -> Iterator[Problem]:
-    point, heights = heights_over(places[:, :2], triangles)
-    below = places[point, 2] - heights
-    hidden = np.unique(point[(below > LAYER_DISTANCES[0]) & (below < LAYER_DISTANCES[1])])
-    if len(hidden):
-        at = shapely.Point(places[hidden[0], :2])
-        yield Problem(
-            "WARNING",
-            f"Road lies {LAYER_DISTANCES[0]:g} to {LAYER_DISTANCES[1]:g} m above other road at "
-            f"{counted(len(hidden), 'place')}, as at {_place(at)}: targets are on the upper one; remove surfaces that "
-            "are not road.",
-            _nearest_road(contents, at),
         )
 
 

@@ -129,49 +129,11 @@ def _make_folder(folder: Path) -> tuple[Path, ...]:
     return missing
 
 
-def lock_folder(folder: Path) -> int:
-    """Lock a folder against other processes until this process ends, normally or not.
-
-    Parameters
-    ----------
-    folder : path
-        Existing folder.
-
-    Returns
-    -------
-    int
-        File descriptor that holds the lock until it is closed.
-
-    Raises
-    ------
-    SeipError
-        Another process holds the lock.
-    """
-    windows = sys.platform == "win32"  # Windows cannot open folders as files
-    handle = os.open(folder / _LOCK_NAME, os.O_RDWR | os.O_CREAT) if windows else os.open(folder, os.O_RDONLY)
-    try:
-        _lock(handle)
-    except OSError as error:
-        if error.errno not in _LOCK_ERRORS:  # a file system without locks
-            return handle
-        os.close(handle)
-        raise SeipError(
-            f"another run is writing to {folder}: wait until it has ended, or choose another folder"
-        ) from error
-    return handle
-
-
-def unlock_folder(folder: Path, lock: int) -> None:
-    """Release the lock that `lock_folder` returned."""
-    os.close(lock)
-    if sys.platform == "win32":
-        with suppress(OSError):  # another process has it by now
-            (folder / _LOCK_NAME).unlink()
-
-
 @contextmanager
 def locked_folder(folder: Path) -> Iterator[None]:
-    """Lock a folder while the block runs; it is created if it is missing, and removed if it stays empty.
+    """Lock a folder against other processes while the block runs, or until this process ends, normally or not.
+
+    The folder is created if it is missing, and removed if it stays empty.
 
     Raises
     ------
@@ -179,11 +141,23 @@ def locked_folder(folder: Path) -> Iterator[None]:
         Another process holds the lock, or the folder cannot be written.
     """
     made = check_folder(folder)
-    lock = lock_folder(folder)
+    windows = sys.platform == "win32"  # Windows cannot open folders as files
+    handle = os.open(folder / _LOCK_NAME, os.O_RDWR | os.O_CREAT) if windows else os.open(folder, os.O_RDONLY)
+    try:
+        _lock(handle)
+    except OSError as error:
+        if error.errno in _LOCK_ERRORS:  # otherwise it is a file system without locks
+            os.close(handle)
+            raise SeipError(
+                f"another run is writing to {folder}: wait until it has ended, or choose another folder"
+            ) from error
     try:
         yield
     finally:
-        unlock_folder(folder, lock)
+        os.close(handle)
+        if windows:
+            with suppress(OSError):  # another process has it by now
+                (folder / _LOCK_NAME).unlink()
         remove_empty(made)
 
 

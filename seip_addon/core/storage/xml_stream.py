@@ -3,10 +3,8 @@
 import gzip
 import os
 import zlib
-from collections.abc import Callable, Generator, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Generator
 from pathlib import Path
-from typing import BinaryIO, cast
 from xml.parsers import expat  # document types, through which XML does harm, are refused below
 
 from ..base.errors import SeipError
@@ -24,63 +22,6 @@ _ALWAYS_UNPACKED = 1 << 30  # unpacked bytes accepted for any file: stationary t
 _GZIP = b"\x1f\x8b"
 
 
-class _Unpacked(gzip.GzipFile):
-    """A gzip file that can be read up to a number of unpacked bytes."""
-
-    def __init__(self, file: BinaryIO, most: int, name: str) -> None:
-        super().__init__(fileobj=file)
-        self._left, self._file_name = most, name
-
-    def read(self, size: int | None = -1) -> bytes:
-        """Return up to `size` bytes; raise an error if the file unpacks to too many."""
-        return self._counted(super().read(size))
-
-    def read1(self, size: int = -1) -> bytes:
-        """Return available bytes, with the same check as `read`."""
-        return self._counted(super().read1(size))
-
-    def _counted(self, content: bytes) -> bytes:
-        self._left -= len(content)
-        if self._left < 0:
-            raise SeipError(
-                f"{self._file_name} unpacks to more than {_MAX_RATIO} times its size, which no map or simulation does: "
-                "use a different file"
-            )
-        return content
-
-
-@contextmanager
-def opened(path: str | os.PathLike[str]) -> Iterator[tuple[BinaryIO, Callable[[], Progress]]]:
-    """Open a file, unpacking it if it is compressed with gzip.
-
-    Yields
-    ------
-    stream : binary file
-    progress : callable
-        Function that returns the progress through the file.
-
-    Raises
-    ------
-    SeipError
-        The file does not exist, cannot be read, or is damaged; also raised for errors within the block.
-    """
-    name = Path(path).name
-    try:
-        with Path(path).open("rb") as file:
-            size = os.fstat(file.fileno()).st_size
-            packed = file.read(2) == _GZIP
-            file.seek(0)
-            most = max(_MAX_RATIO * size, _ALWAYS_UNPACKED)
-            stream = cast(BinaryIO, _Unpacked(file, most, name) if packed else file)
-            yield stream, lambda: Progress(min(file.tell(), size), size, f"reading {name}")
-    except FileNotFoundError as error:
-        raise SeipError(f"no such file: {path}; check its path") from error
-    except (EOFError, gzip.BadGzipFile, zlib.error) as error:
-        raise SeipError(f"{name} is a damaged gzip file ({error}); write it again") from error
-    except OSError as error:
-        raise SeipError(f"cannot read {path}: {error.strerror or error}; check that it is a readable file") from error
-
-
 def read_tags(
     path: str | os.PathLike[str],
     take: Callable[[str, Attributes], object],
@@ -88,7 +29,7 @@ def read_tags(
     *,
     cure: str = SUMO_CURE,
 ) -> Generator[Progress, None, None]:
-    """Call ``take`` with the name and the attributes of each element in a file, in order.
+    """Call ``take`` with the name and the attributes of each element in a file, in order; it may be packed with gzip.
 
     Parameters
     ----------
@@ -111,22 +52,37 @@ def read_tags(
     name = Path(path).name
     parser = _parser(name, take, leave, cure)
     taken = 0
-    with opened(path) as (stream, progress):
-        try:
+    try:
+        with Path(path).open("rb") as file:
+            size = os.fstat(file.fileno()).st_size
+            packed = file.read(2) == _GZIP
+            file.seek(0)
+            stream = gzip.GzipFile(fileobj=file) if packed else file
             while chunk := stream.read(_CHUNK):
-                parser.Parse(chunk, False)  # noqa: FBT003  # takes no name
                 taken += len(chunk)
+                if taken > max(_MAX_RATIO * size, _ALWAYS_UNPACKED):
+                    raise SeipError(
+                        f"{name} unpacks to more than {_MAX_RATIO} times its size, which no map or simulation does: "
+                        "use a different file"
+                    )
+                parser.Parse(chunk, False)  # noqa: FBT003  # takes no name
                 if taken - max(parser.CurrentByteIndex, 0) > _MAX_TOKEN:
                     raise SeipError(
                         f"{name} holds a tag or text of more than {_MAX_TOKEN >> 20} MiB, which no map or simulation "
                         f"writes; {cure}"
                     )
-                yield progress()
+                yield Progress(min(file.tell(), size), size, f"reading {name}")
             parser.Parse(b"", True)  # noqa: FBT003  # takes no name
-        except expat.ExpatError as error:
-            raise SeipError(f"{name} is broken or unfinished XML ({error}); {cure}") from error
-        except (LookupError, ValueError) as error:  # an encoding that Python or expat does not support
-            raise SeipError(f"{name} is XML in an encoding that cannot be read ({error}); save it as UTF-8") from error
+    except expat.ExpatError as error:
+        raise SeipError(f"{name} is broken or unfinished XML ({error}); {cure}") from error
+    except (LookupError, ValueError) as error:  # an encoding that Python or expat does not support
+        raise SeipError(f"{name} is XML in an encoding that cannot be read ({error}); save it as UTF-8") from error
+    except FileNotFoundError as error:
+        raise SeipError(f"no such file: {path}; check its path") from error
+    except (EOFError, gzip.BadGzipFile, zlib.error) as error:
+        raise SeipError(f"{name} is a damaged gzip file ({error}); write it again") from error
+    except OSError as error:
+        raise SeipError(f"cannot read {path}: {error.strerror or error}; check that it is a readable file") from error
 
 
 def _parser(

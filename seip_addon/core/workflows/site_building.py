@@ -7,16 +7,14 @@ from pathlib import Path
 
 import numpy as np
 import shapely
-from shapely.geometry.base import BaseGeometry
 
 from ..base.arrays import Float
 from ..base.errors import SeipError
 from ..base.progress import Progress
 from ..base.settings import setting
 from ..geometry.geo_reference import GeoReference
-from ..geometry.plan import united
 from ..storage.files import whole_file
-from ..world.elevation.at_place import MapSurroundings, TerrainRequest, with_terrain
+from ..world.elevation.at_place import MapSurroundings, with_terrain
 from ..world.opendrive.junctions import STREETS
 from ..world.opendrive.read import read_map
 from ..world.opendrive.road_map import RoadMap
@@ -31,7 +29,6 @@ from ..world.openstreetmap.site import (
     site_of_extract,
     surroundings_of_map,
 )
-from ..world.streetscape import road_surface
 from ..world.streetscape.description import DEFAULT_RADIUS, SiteDescription
 from ..world.streetscape.levels import UnclearLevelError
 from ..world.streetscape.model import SiteModel, street_model
@@ -54,8 +51,8 @@ class SiteRequest(ExtractPlace):
         Site description for a map.
     osm : Path or None
         Extract whose buildings, trees and posts are added to an OpenDRIVE map.
-    terrain : TerrainRequest or None
-        Elevation model or laser survey that gives the ground its heights.
+    terrain : Path or None
+        Elevation model that gives the ground of a flat map its heights.
     anywhere : bool
         Whether to use the centre of a map if no position is given.
     sumo : tuple of Path
@@ -69,7 +66,7 @@ class SiteRequest(ExtractPlace):
     osm: Path | None = setting(
         None, "OpenStreetMap extract with buildings, trees and posts for a map", metavar="EXTRACT"
     )
-    terrain: TerrainRequest | None = None
+    terrain: Path | None = setting(None, "ground for a flat map (GeoTIFF)", metavar="FILE")
     anywhere: bool = False
     sumo: tuple[Path, ...] = ()
     overpass: OverpassServer | None = None
@@ -77,7 +74,7 @@ class SiteRequest(ExtractPlace):
 
 @dataclass(frozen=True, eq=False)
 class BuiltSite:
-    """Model of a site with the name of its map, the map itself if made from an extract, and laser-survey boxes.
+    """Model of a site with the name of its map, and the map itself if made from an extract.
 
     Parameters
     ----------
@@ -123,7 +120,7 @@ def build_site(
     if request.osm is not None:
         where = _where(streets, description)
         description, notes = yield from surroundings_of_map(request.osm, streets, description, *where)
-    description, more = yield from _with_terrain(streets, description, request)
+    description, more = _with_terrain(streets, description, request)
     model = yield from street_model(streets, description)
     return BuiltSite(map_path.name, replace(model, notes=(*notes, *more, *model.notes)), None, map_path)
 
@@ -187,7 +184,7 @@ def _of_extract(source: Path, request: SiteRequest, map_path: Path | None) -> Ge
         name=described.name or found.name,
         level=request.level,
     )
-    description, more = yield from _with_terrain(site.network.streets, description, request)
+    description, more = _with_terrain(site.network.streets, description, request)
     yield Progress(0, 0, "heights of streets")
     site = replace(site, description=description).on_ground()
     try:
@@ -203,26 +200,17 @@ def _of_extract(source: Path, request: SiteRequest, map_path: Path | None) -> Ge
 
 def _with_terrain(
     streets: StreetMap, description: SiteDescription, request: SiteRequest
-) -> Generator[Progress, None, tuple[SiteDescription, tuple[str, ...]]]:
-    """Add ground and objects from a terrain file to a description."""
+) -> tuple[SiteDescription, tuple[str, ...]]:
+    """Add the ground of an elevation model to a description."""
     if request.terrain is None:
         return description, ()
     middle, reach = _where(streets, description)
     area = shapely.Point(middle).buffer(reach + SCENE_MARGIN + STANDS_AROUND, quad_segs=16)
     x, y, z, heading = streets.road_map.header_offset.tolist()
     reference = GeoReference(streets.road_map.geo_reference or "", (x, y, z, heading))
-    surroundings = MapSurroundings(reference, area, *_roads(streets, area))
-    return (yield from with_terrain(description, request.terrain, surroundings))
-
-
-def _roads(streets: StreetMap, area: BaseGeometry) -> tuple[Float, BaseGeometry]:
-    """Return points (n, 3) of the lanes near an area, or of all lanes if none is near, and the carriageway there."""
     points = np.concatenate([np.empty((0, 3)), *(edge for lane in streets.lanes for edge in (lane.left, lane.right))])
     near = points[shapely.intersects_xy(area, points[:, :2])]
-    paved = road_surface.in_groups(streets.lanes, road_surface.CARRIAGEWAY)
-    there = [lane.polygon for lane in paved if road_surface.is_near(lane, area)]
-    junctions = [one.carriageway for one in streets.junctions if one.carriageway.intersects(area)]
-    return near if len(near) else points, road_surface.without_crumbs(united([*there, *junctions]))
+    return with_terrain(description, request.terrain, MapSurroundings(reference, area, near if len(near) else points))
 
 
 def _of_map(source: Path, request: SiteRequest) -> tuple[Path, RoadMap, SiteDescription]:

@@ -52,15 +52,12 @@ class SimulationSettings:
         if not 0.0 < self.duration < math.inf or not 0.0 <= self.warm_up < math.inf:
             raise SeipError("--duration must be above 0 s, and --warm-up not below 0 s")
 
-    def scenario(self, seed: int) -> Scenario:
-        """Return the scenario of the run with a seed, its warm-up included."""
-        return Scenario(self.demand, self.signals, seed, self.warm_up + self.duration)
-
     def run(
         self, map_path: Path, seed: int, geometry: SceneGeometry, sumo: Iterable[Path] = ()
     ) -> Generator[Progress, None, SimulatedRun]:
         """Simulate the run with a seed; see `simulate_run`."""
-        return simulate_run(map_path, self.scenario(seed), self.warm_up, geometry, sumo)
+        scenario = Scenario(self.demand, self.signals, seed, self.warm_up + self.duration)
+        return simulate_run(map_path, scenario, self.warm_up, geometry, sumo)
 
 
 @dataclass(frozen=True, eq=False)

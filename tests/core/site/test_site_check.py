@@ -3,7 +3,6 @@
 import dataclasses
 
 import numpy as np
-import pytest
 
 from seip_addon.core.base.progress import finish
 from seip_addon.core.geometry.plan import outline
@@ -71,9 +70,3 @@ def test_no_warning_is_about_an_object_that_the_builder_made():
     assert found(*SOUND.surfaces, beside, poles=(far, twin, same), built=("beside", "far", "twin", "same")) == []
     assert [obj for _, obj, _ in found(*SOUND.surfaces, poles=(far, twin, same), built=("far", "same"))] == ["twin"]
     assert one(found(ROAD, beside, PAVEMENT, built=("beside",)), "no road within") == ("ERROR", "beside")
-
-
-@pytest.mark.parametrize(("above", "complains"), [(0.3, True), (6.0, False)])
-def test_road_closely_above_road_is_a_mistake_and_a_bridge_is_none(above, complains):
-    deck = Surface("roads", "deck", sheet(-50, -4, 50, 4, above))
-    assert any("above other road" in text for _, _, text in found(*SOUND.surfaces, deck)) == complains

@@ -1,7 +1,6 @@
 """One run at a time in a folder, and nothing left there by runs that ended otherwise than they should."""
 
 import csv
-import os
 import signal
 import subprocess
 import sys
@@ -13,12 +12,12 @@ from seip_addon.core.base.errors import SeipError
 from seip_addon.core.sensing.lidar.catalogue import load_catalogue
 from seip_addon.core.site.installed_cost import load_installed_cost
 from seip_addon.core.storage.csv_table import save_csv
-from seip_addon.core.storage.files import lock_folder, locked_folder, save_json, whole_file
+from seip_addon.core.storage.files import locked_folder, save_json, whole_file
 from seip_addon.core.world.streetscape.site_file import read_site_description
 
 ROOT = Path(__file__).resolve().parents[3]
 HOLD = "import sys, time; from pathlib import Path; from seip_addon.core.storage.files import *; "
-LOCK = HOLD + "lock_folder(Path(sys.argv[1])); print('held', flush=True); time.sleep(60)"
+LOCK = HOLD + "part = locked_folder(Path(sys.argv[1])); part.__enter__(); print('held', flush=True); time.sleep(60)"
 WRITE = HOLD + "part = whole_file(Path(sys.argv[1]) / 'a.json'); print(part.__enter__(), flush=True); time.sleep(60)"
 
 
@@ -43,12 +42,15 @@ def other():
 def test_a_folder_that_another_run_writes_to_is_refused_until_that_ends_however_it_ends(tmp_path, other):
     process, said = other(LOCK, tmp_path)
     assert said == "held"
-    with pytest.raises(SeipError, match=r"another run is writing to .*: wait until it has ended"):
-        lock_folder(tmp_path)
+    with (
+        pytest.raises(SeipError, match=r"another run is writing to .*: wait until it has ended"),
+        locked_folder(tmp_path),
+    ):
+        pass
     process.send_signal(signal.SIGKILL)
     process.wait()
-    os.close(lock_folder(tmp_path))
-    assert list(tmp_path.iterdir()) == []
+    with locked_folder(tmp_path):
+        assert list(tmp_path.iterdir()) == []
 
 
 def test_the_next_run_removes_what_a_killed_one_left_and_nothing_else(tmp_path, other):

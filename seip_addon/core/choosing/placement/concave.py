@@ -99,8 +99,8 @@ def relative_gap(value: float, bound: float) -> float:
 
 
 @dataclass(frozen=True, eq=False)
-class ConcaveSum:
-    """F over c candidates and t targets.
+class _Sum:
+    """F over c candidates and t targets: what is the same for every g.
 
     Parameters
     ----------
@@ -144,46 +144,9 @@ class ConcaveSum:
         share = SINGLE_ROUNDING if self.amounts.dtype == np.float32 else DOUBLE_ROUNDING
         return share * (float(self.weight.sum()) + self.value_at(self.together(np.arange(len(self)))))
 
-    @property
-    def operations(self) -> float:
-        """Number of multiplications that take as long as the scores of all candidates."""
-        raise NotImplementedError
-
-    @property
-    def update_operations(self) -> float:
-        """Number of multiplications that take as long as `gains` for amounts that differ little from the last ones."""
-        return self.operations
-
-    def gains(self, base: Float) -> Float:
-        """Return what each candidate adds to amounts ``base`` (t,), (c,) float64."""
-        raise NotImplementedError
-
     def open_targets(self, base: Float) -> Integer:
         """Return the targets to which further sensors may add anything."""
         return np.arange(len(base))
-
-    def lowest(self, base: Float) -> Float:
-        """Return the smallest parameters (t,) of a bound for amounts ``base`` (t,); they rise with falling slope."""
-        raise NotImplementedError
-
-    def start(self, base: Float) -> Float:
-        """Return parameters (t,) of a bound to begin from, given the amounts of a good placement."""
-        raise NotImplementedError
-
-    def bound(self, base: Float, parameters: Float) -> tuple[float, Float]:
-        """Return the bound on F for amounts ``base``: a constant, and what each candidate adds to it, (c,)."""
-        raise NotImplementedError
-
-    def slope(self, base: Float, parameters: Float, picked: Integer) -> Float:
-        """Return the derivative of the bound with some candidates by each parameter, per unit of weight, (t,).
-
-        It is 0 where a smaller bound is beyond the limits of a parameter.
-        """
-        raise NotImplementedError
-
-    def clipped(self, base: Float, parameters: Float) -> Float:
-        """Return parameters moved into their limits."""
-        raise NotImplementedError
 
 
 class _LastGains:
@@ -205,7 +168,7 @@ class _LastGains:
 
 
 @dataclass(frozen=True, eq=False)
-class StepSum(ConcaveSum):
+class StepSum(_Sum):
     """F of `Steps`: its bound's parameters are negative slopes."""
 
     g: Steps
@@ -213,12 +176,12 @@ class StepSum(ConcaveSum):
 
     @property
     def operations(self) -> float:
-        """A product of a matrix and a vector."""
+        """Number of multiplications that take as long as all scores: a product of a matrix and a vector."""
         return 0.6 * self.amounts.size
 
     @property
     def update_operations(self) -> float:
-        """A product with the part of the matrix that has changed."""
+        """Number of multiplications that take as long as `gains` after those of a similar choice: the changed part."""
         return 0.15 * self.amounts.size
 
     @cached_property
@@ -279,7 +242,7 @@ class StepSum(ConcaveSum):
         return np.flatnonzero(self._rise(base) > 0)
 
     def lowest(self, base: Float) -> Float:
-        """Return the negative slope at the number of sensors given."""
+        """Return the smallest parameters of a bound, (t,): the negative slope at the number of sensors given."""
         return -self._rise(base)
 
     def start(self, base: Float) -> Float:
@@ -289,7 +252,7 @@ class StepSum(ConcaveSum):
         return start
 
     def bound(self, base: Float, parameters: Float) -> tuple[float, Float]:
-        """Return the bound, in which each candidate adds the slopes of the targets that it sees."""
+        """Return the bound: a constant, and what each candidate adds, the slopes of the targets that it sees, (c,)."""
         slope = -parameters
         # the tangent of a slope touches where the next step is smaller: its value at the number of sensors given
         reached, level = self.g(base), base
@@ -300,7 +263,11 @@ class StepSum(ConcaveSum):
         return float(self.weight @ (reached + above)), self._product(self.weight * slope)
 
     def slope(self, base: Float, parameters: Float, picked: Integer) -> Float:
-        """Return how many sensors the tangent is above the base, less how many of those picked see the target."""
+        """Return the derivative of the bound with the picked candidates by each parameter, per unit of weight, (t,).
+
+        It is the number of sensors by which the tangent is above the base, less the number of those picked that see the
+        target, and 0 where a smaller bound is beyond the limits of a parameter.
+        """
         slope, level = -parameters, base
         steps = np.zeros(len(base))
         for _ in self.g.rises:
@@ -322,7 +289,7 @@ class StepSum(ConcaveSum):
 
 
 @dataclass(frozen=True, eq=False)
-class LogSum(ConcaveSum):
+class LogSum(_Sum):
     """F of `Logarithm`: its bound's parameters are ln(1 + x) at the points of the tangents, or -ln σ."""
 
     @property
@@ -388,3 +355,6 @@ class LogSum(ConcaveSum):
         """Return parameters of at least ln(1 + base)."""
         clipped: Float = np.maximum(parameters, self.lowest(base))
         return clipped
+
+
+ConcaveSum = StepSum | LogSum

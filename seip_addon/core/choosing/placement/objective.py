@@ -378,7 +378,6 @@ def _named(candidates: Candidates, names: Sequence[str]) -> NDArray[np.bool_]:
             hint = f"there are {known[0]!r} to {known[-1]!r}"
             if near:
                 hint = f"did you mean {' or '.join(map(repr, near))}?"
-            listed = "the candidates.csv of a run lists all; quote names with blanks"
-            raise SeipError(f"there is no position {name!r}; {hint} ({listed})")
+            raise SeipError(f"there is no position {name!r}; {hint} (quote names with blanks)")
     found: NDArray[np.bool_] = np.array(names, dtype=np.str_)[:, None] == candidates.position_name
     return found

@@ -14,7 +14,7 @@ from ...base.arrays import Float
 from ...base.estimates import IntervalEstimate, mean_of, quantile_of
 from ...base.progress import Progress
 from ...sensing.scenarios.pose_errors import ERROR_KINDS, PoseErrors
-from ...sensing.scenarios.visibility_under_errors import visibility_under_errors
+from ...sensing.scenarios.scenario_visibility import visibility_under_errors
 from ...sensing.visibility.surroundings import Surroundings
 from ..placement.deployment import Deployment
 

@@ -9,10 +9,12 @@ import numpy as np
 
 from ...base.arrays import Float, Integer
 from ...base.progress import Progress
-from ...sensing.scenarios.scenario_visibility import ScenarioVisibility
+from ...sensing.scenarios.scenario_visibility import (
+    ScenarioVisibility,
+    visibility_in_traffic,
+    visibility_under_errors,
+)
 from ...sensing.scenarios.traffic_instants import Instants, spread_instants
-from ...sensing.scenarios.visibility_in_traffic import visibility_in_traffic
-from ...sensing.scenarios.visibility_under_errors import visibility_under_errors
 from ...sensing.traffic.trajectories import Trajectories
 from ...sensing.visibility.surroundings import Surroundings
 from ..placement.problem import Placement, PlacementProblem

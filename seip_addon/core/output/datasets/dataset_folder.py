@@ -77,7 +77,7 @@ def write_dataset(
     Raises
     ------
     SeipError
-        The folder cannot be written or belongs to something else, or the format cannot represent the run.
+        The folder cannot be written or belongs to something else.
     """
     folder = Path(folder)
     manifest = _manifest_of(folder, kind, min_points)
@@ -191,7 +191,6 @@ def _new_entry(run: TrafficRun, kind: Format) -> Record:
         "simulation": dict(run.record),
         "origin_m": run.origin.tolist(),
         "sensors": sensors,
-        "notes": list(kind.notes(run)),
         "first": 0,
         "frames": 0,
         "labels": {},

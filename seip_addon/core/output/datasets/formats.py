@@ -1,18 +1,15 @@
-"""Formats of datasets: KITTI, OpenPCDet, mmdetection3d and PCD; and files of detections as detectors write them.
+"""Formats of datasets: KITTI, OpenPCDet and PCD; and files of detections as detectors write them.
 
 .. [1] A. Geiger, P. Lenz, R. Urtasun, "Are we ready for Autonomous Driving? The KITTI Vision Benchmark Suite", CVPR
    2012; readme of the object development kit.
 .. [2] OpenPCDet, docs/CUSTOM_DATASET_TUTORIAL.md.
 .. [3] OpenPCDet, pcdet/datasets/custom/custom_dataset.py.
-.. [4] mmdetection3d, docs/en/user_guides/coord_sys_tutorial.md.
-.. [5] mmdetection3d, docs/en/advanced_guides/customize_dataset.md.
-.. [6] Point Cloud Library, "The PCD (Point Cloud Data) file format", version 0.7.
+.. [4] Point Cloud Library, "The PCD (Point Cloud Data) file format", version 0.7.
 """
 
 import io
 import json
 import math
-import pickle
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -24,9 +21,8 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from ...base.arrays import Float
-from ...base.errors import SeipError
 from ...geometry.orientation import quaternion_of
-from .sample import Sample, TrafficRun, cloud, shortest
+from .sample import MERGED, Sample, cloud, shortest
 
 Files = dict[str, Callable[[], bytes]]
 """Functions that return the bytes of each file, by its path in the folder of a dataset."""
@@ -58,8 +54,6 @@ PLAN_STEP = 6.4  # what the range is a multiple of in plan, metres: 16 pillars o
 HEIGHT_STEP = 2.0  # what the range is a multiple of in height, metres: 40 voxels of 0.05 m, as networks ask for
 MARGIN = 0.5  # between the boxes and the range, metres
 PILLAR_SIZE = 0.2
-LABELS = {name: number for number, name in enumerate(CLASSES.values())}
-PICKLE_PROTOCOL = 4  # whichever Python writes it, the bytes are the same
 KITTI_CLASSES = {category: KITTI_CLASS[name] for category, name in CLASSES.items()}
 """KITTI has neither buses nor motorcycles; readers ignore or refuse a name that it does not have."""
 NO_KITTI_LABEL = "DontCare -1 -1 -10 0 0 0 0 -1 -1 -1 -1000 -1000 -1000 -10\n"  # the label of a frame without any
@@ -76,7 +70,6 @@ CALIBRATION = "".join(
 )
 FULLY_VISIBLE, PARTLY_VISIBLE = 0.8, 0.4
 """Visibility from which an object counts as fully visible (0) and as partly occluded (1) and not largely (2)."""
-MERGED = "merged"
 IDENTITY = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)  # viewpoint in the origin
 POINT_TYPE = np.dtype([("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("intensity", "<f4")])
 
@@ -95,8 +88,6 @@ class Format:
     index_files : callable
         From the dataset's folder and the names of the samples by split to the bytes of the files of the dataset as a
         whole, by path; called when all samples are written.
-    notes : callable
-        From a `TrafficRun` to sentences for its users; raises `SeipError` if the format cannot represent it.
     """
 
     key: str
@@ -104,7 +95,6 @@ class Format:
     classes: Mapping[str, str]
     sample_files: Callable[[Sample], Files]
     index_files: Callable[[Path, Splits], Mapping[str, bytes]] = lambda _folder, _splits: {}
-    notes: Callable[[TrafficRun], tuple[str, ...]] = lambda _run: ()
 
 
 def label_lines(sample: Sample, xyz: Float) -> str:
@@ -212,42 +202,6 @@ def _configuration(boxes: Float) -> str:
     return head + "".join(f"{key}: {json.dumps(value)}\n" for key, value in values.items())
 
 
-def _mmdetection3d_files(sample: Sample) -> Files:
-    """Return ``points`` (float32) and ``labels`` of a sample, as version 1.1 of mmdetection3d has them.
-
-    Boxes are in LiDAR coordinates: heading counter-clockwise from +x, and the middle of the **underside** [4]_. The
-    text files are those that the documentation asks of a custom dataset [5]_; the information files are made from them.
-    """
-    boxes = sample.boxes
-    underside = boxes.centre - boxes.size * np.array([0.0, 0.0, 0.5])
-    return {
-        f"points/{sample.name}.bin": lambda: cloud(sample.frame).tobytes(),
-        f"labels/{sample.name}.txt": lambda: label_lines(sample, underside).encode(),
-    }
-
-
-def _mmdetection3d_index(folder: Path, splits: Splits) -> dict[str, bytes]:
-    """Return the splits and their information files."""
-    infos = {f"custom_infos_{split}.pkl": _information(folder, names) for split, names in splits.items()}
-    return {**image_sets(splits), **infos}
-
-
-def _information(folder: Path, names: Sequence[str]) -> bytes:
-    samples = []
-    for name in names:
-        boxes, classes = read_labels(folder / f"labels/{name}.txt")
-        rows = zip(boxes.tolist(), classes, strict=True)
-        samples.append(
-            {
-                "sample_idx": int(name),
-                "lidar_points": {"num_pts_feats": 4, "lidar_path": f"{name}.bin"},
-                "instances": [{"bbox_3d": box, "bbox_label_3d": LABELS[kind]} for box, kind in rows],
-            }
-        )
-    about = {"categories": LABELS, "dataset": "custom", "info_version": "1.1"}
-    return pickle.dumps({"metainfo": about, "data_list": samples}, protocol=PICKLE_PROTOCOL)
-
-
 def _kitti_files(sample: Sample) -> Files:
     """Return ``velodyne``, ``label_2``, ``calib`` and ``image_2`` of a sample, with a camera in the origin along +x.
 
@@ -308,7 +262,7 @@ def _empty_picture() -> bytes:
 
 
 def _pcd_files(sample: Sample) -> Files:
-    """Return ``SPLIT/RUN/SENSOR/FRAME.pcd`` of every sensor and of all together, binary [6]_.
+    """Return ``SPLIT/RUN/SENSOR/FRAME.pcd`` of every sensor and of all together, binary [4]_.
 
     All clouds are in the site's local axes, so that they lie over each other when they are opened together. The
     viewpoint of a sensor's cloud is the sensor's pose, that of the merged cloud is the identity.
@@ -349,13 +303,6 @@ def encode(points: NDArray[Any], viewpoint: Sequence[float] = IDENTITY) -> bytes
     return ("\n".join(lines) + "\n").encode() + points.tobytes()
 
 
-def _pcd_notes(run: TrafficRun) -> tuple[str, ...]:
-    """Note nothing, but see that no sensor is called as the merged cloud is."""
-    if any(sensor.label.lower() == MERGED for sensor in run.sensors):
-        raise SeipError(f"a sensor is called '{MERGED}', as is the folder of the merged cloud; rename its empty")
-    return ()
-
-
 def kitti_results(boxes: Float, categories: Sequence[str], score: Float) -> str:
     """Return a line of KITTI's results for each detection: a label, and the score (0 to 1).
 
@@ -380,12 +327,11 @@ FORMATS: dict[str, Format] = {
     kind.key: kind
     for kind in (
         Format("openpcdet", "OpenPCDet's custom dataset", CLASSES, _openpcdet_files, _openpcdet_index),
-        Format("mmdetection3d", "mmdetection3d's format", CLASSES, _mmdetection3d_files, _mmdetection3d_index),
         Format(
             *("kitti", "KITTI's object detection format", KITTI_CLASSES, _kitti_files),
             lambda _folder, splits: image_sets(splits),
         ),
-        Format("pcd", "PCD clouds", {}, _pcd_files, notes=_pcd_notes),
+        Format("pcd", "PCD clouds", {}, _pcd_files),
     )
 }
 """Formats of datasets by the names that a user types."""

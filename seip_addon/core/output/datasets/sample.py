@@ -15,6 +15,7 @@ from ...sensing.scans.frame import Frame, Labels
 from ...sensing.scans.sensor import MountedSensor
 
 SPLITS = ("train", "val", "test")
+MERGED = "merged"  # name of the cloud of all sensors together
 
 WRITTEN = "written"
 OUTSIDE = "outside_region"
@@ -59,6 +60,8 @@ class TrafficRun:
             raise SeipError(f"the run '{self.name}' has no sensors; place some and simulate it again")
         for sensor in self.sensors:
             require_file_name(sensor.label, "the sensor", "rename its empty")
+            if sensor.label.lower() == MERGED:
+                raise SeipError(f"a sensor is called '{MERGED}', as is the cloud of all together; rename its empty")
         label, count = Counter(sensor.label.lower() for sensor in self.sensors).most_common(1)[0]
         if count > 1:
             raise SeipError(f"two sensors are called '{label}'; rename one")

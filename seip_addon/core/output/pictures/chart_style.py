@@ -1,6 +1,5 @@
 """Style of all charts: colours, marks, axes, legends and titles."""
 
-import math
 import os
 from collections.abc import Sequence
 from typing import Any, Literal
@@ -9,7 +8,6 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ...base.estimates import IntervalEstimate
 from .drawing import Window, new_page, save_png, window_around
 from .palette import INK, SERIES_COLOURS, SOFT_INK
 
@@ -88,9 +86,3 @@ def save_chart(path: str | os.PathLike[str], figure: Figure, title: str, panels:
         add_legend(figure, panels)
     set_title(figure, title)
     save_png(path, figure)
-
-
-def interval_ends(estimate: IntervalEstimate) -> tuple[float, float]:
-    """Return the ends of an interval; an open end is drawn at the value."""
-    low, high = (end if math.isfinite(end) else estimate.value for end in (estimate.low, estimate.high))
-    return low, high

@@ -1,4 +1,4 @@
-"""Cameras of the rendered pictures, and what they show where: all that the Blender that renders needs of pictures."""
+"""Camera of the rendered picture, and what it shows where: all that the Blender that renders needs of pictures."""
 
 from __future__ import annotations
 
@@ -8,18 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...base.arrays import Boolean, Float
-from ...choosing.placement.deployment import Sensor
-from ...site.site import Site
-
-TILE = (640, 480)
-"""Width and height of a close-up, pixels."""
-MOST = 60
-"""Largest number of sensors on a sheet of close-ups: readers refuse larger pictures."""
-VIEW_REACH = 9.0  # metres around the sensor that a close-up shows
-SLOPES = np.array((0.52, 0.39))  # tangents of half the field of view of a close-up
-ELEVATIONS = np.radians((24.0, 38.0, 55.0, 75.0))
-TURNS = np.radians((0.0, 30.0, -30.0, 60.0, -60.0, 100.0, -100.0, 150.0))
-"""Directions tried for the camera of a close-up: height above the horizon, and from that of the road."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,14 +63,3 @@ def frame(points: Float, azimuth: float, elevation: float, slopes: Float) -> Vie
     low = (-seen[:, :2] + slopes * seen[:, 2:]).max(axis=0)
     place = axes @ np.append((high - low) / 2.0, ((high + low) / (2.0 * slopes)).max())
     return Viewpoint(place, axes, slopes)
-
-
-def viewpoints(site: Site, sensor: Sensor) -> list[Viewpoint]:
-    """Return camera positions for a close-up of a sensor, the best first: from over the road, rather low."""
-    nearest = site.targets.xyz[np.argmin(np.hypot(*(site.targets.xyz - sensor.xyz)[:, :2].T))]
-    away = nearest[:2] - sensor.foot[:2]
-    towards = float(np.arctan2(away[1], away[0]))
-    ring = np.linspace(0.0, 2.0 * np.pi, 12, endpoint=False)
-    ground = sensor.foot + VIEW_REACH * np.column_stack((np.cos(ring), np.sin(ring), np.zeros(12)))
-    points = np.vstack((ground, sensor.foot, sensor.xyz + np.array((0.0, 0.0, 1.0))))
-    return [frame(points, towards + turn, elevation, SLOPES) for elevation in ELEVATIONS for turn in TURNS]

@@ -21,13 +21,6 @@ class Bullets:
 
 
 @dataclass(frozen=True)
-class Code:
-    """Command line."""
-
-    text: str
-
-
-@dataclass(frozen=True)
 class Table:
     """Table of few and narrow columns, which fit a phone; the columns in ``numbers``, from 0, are aligned right."""
 
@@ -54,22 +47,14 @@ class Picture:
 
 
 @dataclass(frozen=True)
-class Pictures:
-    """Pictures of one size side by side, or one below the other on a phone; ``about`` is for those who cannot see."""
-
-    pngs: tuple[bytes, ...]
-    about: str
-
-
-@dataclass(frozen=True)
 class Card:
     """Something with a heading of its own that stays on one page, such as a sensor."""
 
     title: str
-    blocks: tuple[Paragraph | Facts | Pictures, ...]
+    blocks: tuple[Paragraph | Facts, ...]
 
 
-Block = Paragraph | Bullets | Code | Table | Facts | Picture | Pictures | Card
+Block = Paragraph | Bullets | Table | Facts | Picture | Card
 
 
 @dataclass(frozen=True)

@@ -14,10 +14,9 @@ from PIL import Image
 from ...base.arrays import Boolean, Integer
 from ...base.errors import SeipError
 from ...geometry.geo_reference import GeoReference
-from ..pictures.close_ups import close_ups
 from ..results.file_names import (
     POSE_ERROR_PICTURES,
-    TRAFFIC_PICTURES,
+    TRAFFIC_PICTURE,
     VERIFICATION_FILE,
     VERIFICATION_FOLDER,
     VERIFICATION_PICTURE,
@@ -28,8 +27,6 @@ from ..results.verification_record import VerificationRecord, load_verification
 from .blind_spots import Centre, centres
 
 PICTURES = ("view.png", "plan.png")
-CLOSE_UPS = "sensors.png"
-SHARE_ERROR = 1e-8  # shares are rounded to nine digits
 SAME_PLACE = 0.001
 """Metres by which the planned position in a verification may differ from the placement: poses in scenes are rounded."""
 
@@ -42,8 +39,6 @@ class Evidence:
     ----------
     pictures : mapping of str to bytes
         Existing pictures as PNG by file name, those of a verification included.
-    close_ups : tuple of tuple of bytes
-        Existing close-ups as PNG of each sensor, or of the first ones: plan and view.
     verification : VerificationRecord or None
         Installation compared with the plan, if it was verified.
     """
@@ -51,7 +46,6 @@ class Evidence:
     record: PlacementRecord
     site: SiteFile
     pictures: Mapping[str, bytes]
-    close_ups: tuple[tuple[bytes, ...], ...] = ()
     verification: VerificationRecord | None = None
 
     @property
@@ -103,35 +97,15 @@ def load_evidence(folder: Path) -> Evidence:
     key = record.inputs.get("visibility")
     if site.key != key or len(site.seen) != len(record.sensors):
         raise SeipError(f"{folder} holds files of different placements: place the sensors again")
-    if not _agree(record, site):
-        raise SeipError(f"placement.json and site.npz in {folder} contradict each other: place the sensors again")
     names = list(PICTURES)
     names += POSE_ERROR_PICTURES if record.request.goal.scenarios.errs else ()
-    names += TRAFFIC_PICTURES if record.request.goal.scenarios.kind == "traffic" else ()
+    names += [TRAFFIC_PICTURE] if record.request.goal.scenarios.kind == "traffic" else []
     pictures = {name: _picture(folder / name) for name in names if (folder / name).is_file()}
     verification = _verification(folder / VERIFICATION_FOLDER, record)
     if verification is not None:
         path = folder / VERIFICATION_FOLDER / VERIFICATION_PICTURE
         pictures |= {path.name: _picture(path, "verify the installation again")} if path.is_file() else {}
-    sheet, shown = folder / CLOSE_UPS, []
-    try:
-        if sheet.is_file() and record.sensors:
-            shown = close_ups(_picture(sheet), len(record.sensors))
-    except ValueError as error:
-        raise SeipError(f"{sheet} is of another placement: place the sensors again") from error
-    return Evidence(record, site, pictures, tuple(shown), verification)
-
-
-def _agree(record: PlacementRecord, site: SiteFile) -> bool:
-    """Return whether the figures of a placement are those of its site."""
-    counts, seen = record.counts, site.seen
-    recorded = np.array([record.coverage.whole, *(sensor.coverage_alone for sensor in record.sensors)])
-    computed = np.array([seen.any(axis=0).mean(), *seen.mean(axis=1)])
-    numbers = (counts.targets, counts.targets_central, counts.poses)
-    central = int(np.count_nonzero(site.targets.central))
-    return numbers == (len(site.targets), central, len(site.problem.prices)) and bool(
-        (np.abs(recorded - computed) <= SHARE_ERROR).all()
-    )
+    return Evidence(record, site, pictures, verification)
 
 
 def _verification(folder: Path, record: PlacementRecord) -> VerificationRecord | None:

@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterable
 from html import escape
 
-from .blocks import Block, Bullets, Card, Code, Facts, Paragraph, Picture, Pictures, Report, Table
+from .blocks import Block, Bullets, Card, Facts, Paragraph, Picture, Report, Table
 
 POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'"
 """Nothing is fetched, and no script runs, whatever stands in the page."""
@@ -17,17 +17,14 @@ _DIRECTIONS = re.compile("[\u202a-\u202e\u2066-\u2069]")
 STYLE = """
 body { font: 16px/1.5 system-ui, sans-serif; color: #1d2b36; max-width: 60em; margin: 2em auto; padding: 0 1em; }
 h1 { font-size: 1.9em; line-height: 1.2; margin: 0 0 .2em; overflow-wrap: anywhere; }
-h2 { font-size: 1.3em; margin: 2.2em 0 .6em; padding-top: .6em; border-top: 2px solid #1d2b36; break-after: avoid; }
-h3 { font-size: 1.05em; margin: 0 0 .5em; overflow-wrap: anywhere; break-after: avoid; }
+h2 { font-size: 1.3em; margin: 2.2em 0 .6em; padding-top: .6em; border-top: 2px solid #1d2b36; }
+h3 { font-size: 1.05em; margin: 0 0 .5em; overflow-wrap: anywhere; }
 .subtitle { color: #5d6b76; font-size: 1.1em; margin: 0 0 1.2em; }
-figure { margin: 1em 0; break-inside: avoid; }
+figure { margin: 1em 0; }
 img { display: block; max-width: 100%; border: 1px solid #c9d1d7; box-sizing: border-box; }
 figure > img { max-height: 60em; margin: 0 auto; }
 figcaption { color: #5d6b76; font-size: .9em; margin-top: .3em; }
-.pair { display: flex; flex-wrap: wrap; gap: .5em; }
-.pair img { flex: 1 1 16em; min-width: 0; width: 16em; height: auto; }
-.card { border: 1px solid #c9d1d7; border-radius: 4px; padding: 1em; margin: 1em 0; break-inside: avoid; }
-.card figure { margin: 0 0 .8em; }
+.card { border: 1px solid #c9d1d7; border-radius: 4px; padding: 1em; margin: 1em 0; }
 dl { display: grid; grid-template-columns: minmax(6em, max-content) 1fr; gap: .25em 1.2em; margin: .6em 0; }
 dt { color: #5d6b76; }
 dd { margin: 0; overflow-wrap: anywhere; font-variant-numeric: tabular-nums; }
@@ -39,10 +36,6 @@ th { border-bottom-color: #1d2b36; }
 td { overflow-wrap: break-word; }
 .number { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap; }
 th.number { white-space: normal; }
-tr { break-inside: avoid; }
-thead { display: table-header-group; }
-code { display: block; background: #eef1f3; padding: .6em .8em; overflow-wrap: anywhere; white-space: pre-wrap; }
-@page { size: A4; margin: 18mm 16mm; }
 @media (max-width: 30em) {
   body { margin: 1em auto; }
   dl { grid-template-columns: 1fr; gap: 0; }
@@ -50,25 +43,34 @@ code { display: block; background: #eef1f3; padding: .6em .8em; overflow-wrap: a
   .card { padding: .7em; }
   th, td { padding-right: .6em; }
 }
-@media print {
-  body { font-size: 9.5pt; margin: 0; max-width: none; padding: 0; }
-  figure > img { max-height: 14cm; }
-  figure.tall > img { max-height: 21cm; }
-  dl { break-inside: avoid; }
-  header figure > img { max-height: 9.5cm; }
-  section:first-of-type { break-before: page; }
-}
 """
 
 
 def as_html(report: Report) -> str:
-    """Return the page."""
+    """Return the page, which loads nothing."""
     sections = "\n".join(
         f"<section>\n<h2>{_shown(section.title)}</h2>\n{_blocks(section.blocks)}\n</section>"
         for section in report.sections
     )
-    header = f'<h1>{_shown(report.title)}</h1>\n<p class="subtitle">{_shown(report.subtitle)}</p>'
-    return page(report.title, f"<header>\n{header}\n{_blocks(report.first)}\n</header>\n{sections}")
+    return f"""<!DOCTYPE html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta http-equiv="Content-Security-Policy" content="{escape(POLICY)}">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<title>{_shown(report.title)}</title>
+<style>{STYLE}</style>
+</head>
+<body>
+<header>
+<h1>{_shown(report.title)}</h1>
+<p class="subtitle">{_shown(report.subtitle)}</p>
+{_blocks(report.first)}
+</header>
+{sections}
+</body>
+</html>
+"""
 
 
 def _shown(text: str) -> str:
@@ -76,32 +78,13 @@ def _shown(text: str) -> str:
     return escape(_DIRECTIONS.sub("", text))
 
 
-def page(title: str, body: str, style: str = "") -> str:
-    """Return a page that loads nothing, with the style of reports and more."""
-    return f"""<!DOCTYPE html>
-<html lang="en">
-<head>
-<meta charset="utf-8">
-<meta http-equiv="Content-Security-Policy" content="{escape(POLICY)}">
-<meta name="viewport" content="width=device-width, initial-scale=1">
-<title>{_shown(title)}</title>
-<style>{STYLE}{style}</style>
-</head>
-<body>
-{body}
-</body>
-</html>
-"""
-
-
 def _blocks(blocks: Iterable[Block]) -> str:
     return "\n".join(map(_block, blocks))
 
 
 def _block(block: Block) -> str:
-    if isinstance(block, Paragraph | Code):
-        tag = "p" if isinstance(block, Paragraph) else "code"
-        html = f"<{tag}>{_shown(block.text)}</{tag}>"
+    if isinstance(block, Paragraph):
+        html = f"<p>{_shown(block.text)}</p>"
     elif isinstance(block, Bullets):
         html = "<ul>\n" + "\n".join(f"<li>{_shown(line)}</li>" for line in block.lines) + "\n</ul>"
     elif isinstance(block, Facts):
@@ -111,12 +94,8 @@ def _block(block: Block) -> str:
     elif isinstance(block, Card):
         html = f'<div class="card">\n<h3>{_shown(block.title)}</h3>\n{_blocks(block.blocks)}\n</div>'
     elif isinstance(block, Picture):
-        kind = ' class="tall"' if block.tall else ""
         caption = f"<figcaption>{_shown(block.caption)}</figcaption>"
-        html = f"<figure{kind}>{_image(block.png, block.caption)}{caption}</figure>"
-    elif isinstance(block, Pictures):
-        images = "".join(_image(png, block.about) for png in block.pngs)
-        html = f'<figure><div class="pair">{images}</div></figure>'
+        html = f"<figure>{_image(block.png, block.caption)}{caption}</figure>"
     else:
         inner = "\n".join(_row(block, row, "td") for row in block.rows)
         head = _row(block, block.head, "th")

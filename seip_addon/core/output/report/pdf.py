@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from datetime import datetime
 from functools import partial
 from pathlib import Path
-from typing import Any, cast
+from typing import cast
 
 import matplotlib as mpl
 from fpdf import FPDF, FontFace
@@ -16,9 +16,9 @@ from fpdf.enums import Align, TableBordersLayout, VAlign, XPos, YPos
 from PIL import Image
 
 from ...storage.files import whole_file
-from ..pictures.palette import INK, PAPER, SOFT_INK
+from ..pictures.palette import INK, SOFT_INK
 from ..results.file_names import REPORT_FILES
-from .blocks import Block, Bullets, Card, Code, Facts, Paragraph, Picture, Pictures, Report, Section, Table
+from .blocks import Block, Bullets, Card, Facts, Paragraph, Picture, Report, Section, Table
 from .html import as_html
 
 MARGIN, TOP, BOTTOM = 50.0, 52.0, 56.0
@@ -30,15 +30,13 @@ FIRST_PICTURE_HEIGHTS = (400.0, 350.0, 300.0, 250.0, 200.0)
 MAX_PICTURE_HEIGHT, FULL_PAGE_HEIGHT = 400.0, 620.0
 LEAST_SHARE = 0.65
 """Share of its size to which a picture is reduced to fit on a page; if that is not enough, what follows comes first."""
-CARD_PICTURE_HEIGHT = 145.0  # two cards fit on a page below a heading
 HEADING_ROOM, TABLE_ROOM = 90.0, 50.0  # below the top of a heading, and of a table, so that they do not end a page
 MOST_TOGETHER = 12  # rows of a table that stay on one page
-RULE, SHADE = "#c9d1d7", "#eef1f3"
+RULE = "#c9d1d7"
 BULLET_INDENT, CELL_PADDING = 12.0, 3.0
-CODE_PADDING = 6
-TEXT, MONO = "text", "mono"
-FONTS = {(TEXT, ""): "DejaVuSans", (TEXT, "B"): "DejaVuSans-Bold", (MONO, ""): "DejaVuSansMono"}
-"""Files of the type, which Matplotlib brings, by family and style."""
+TEXT = "text"
+FONTS = {"": "DejaVuSans", "B": "DejaVuSans-Bold"}
+"""Files of the type, which Matplotlib brings, by style."""
 
 
 def save_report(folder: Path, report: Report) -> tuple[Path, ...]:
@@ -78,8 +76,8 @@ class _Document(FPDF):
         super().__init__(unit="pt", format="A4")
         self._footer_title = title
         folder = Path(mpl.get_data_path()) / "fonts" / "ttf"
-        for (family, style), file in FONTS.items():
-            self.add_font(family, style, folder / f"{file}.ttf")
+        for style, file in FONTS.items():
+            self.add_font(TEXT, style, folder / f"{file}.ttf")
         self.set_title(title)
         self.set_creator("SEIP for Blender")
         self.set_margins(MARGIN, TOP, MARGIN)
@@ -98,22 +96,12 @@ class _Document(FPDF):
         self.cell(room, SMALL, title if title == self._footer_title else f"{title} …")
         self.cell(60.0, SMALL, f"{self.page_no()} / {{nb}}", align="R")
 
-    def text_lines(  # how text looks
-        self,
-        text: str,
-        size: float,
-        *,
-        style: str = "",
-        color: str = INK,
-        indent: float = 0.0,
-        family: str = TEXT,
-        **more: Any,  # noqa: ANN401  # fpdf2's own
-    ) -> None:
+    def text_lines(self, text: str, size: float, *, style: str = "", color: str = INK, indent: float = 0.0) -> None:
         """Write text in the width of the page, or from an indent on, and go to the next line."""
-        self.set_font(family, style, size)
+        self.set_font(TEXT, style, size)
         self.set_text_color(color)
         self.set_x(MARGIN + indent)
-        self.multi_cell(0, size * LEADING, text, align="L", new_x=XPos.LMARGIN, new_y=YPos.NEXT, **more)
+        self.multi_cell(0, size * LEADING, text, align="L", new_x=XPos.LMARGIN, new_y=YPos.NEXT)
 
     def rule(self, room: float = 4.0) -> None:
         """Draw a line across the page, and leave some room below."""
@@ -198,10 +186,6 @@ def _add_block(pdf: _Document, block: Block, highest: float = MAX_PICTURE_HEIGHT
         pdf.text_lines(block.text, BODY)
     elif isinstance(block, Bullets):
         _add_bullets(pdf, block.lines)
-    elif isinstance(block, Code):
-        pdf.set_fill_color(SHADE)
-        pdf.text_lines(block.text, SMALL, family=MONO, fill=True, padding=CODE_PADDING)
-        pdf.set_fill_color(PAPER)
     elif isinstance(block, Facts):
         _add_facts(pdf, block)
     elif isinstance(block, Card):
@@ -211,10 +195,8 @@ def _add_block(pdf: _Document, block: Block, highest: float = MAX_PICTURE_HEIGHT
         for inner in block.blocks:
             pdf.ln(4.0)
             _add_block(pdf, inner, whole=False)
-    elif isinstance(block, Pictures):
-        _add_pictures(pdf, block.pngs, "", CARD_PICTURE_HEIGHT)
     elif isinstance(block, Picture):
-        _add_pictures(pdf, (block.png,), block.caption, FULL_PAGE_HEIGHT if block.tall else highest)
+        _add_picture(pdf, block, FULL_PAGE_HEIGHT if block.tall else highest)
     else:
         _add_table(pdf, block)
 
@@ -228,26 +210,22 @@ def _add_bullets(pdf: _Document, lines: Sequence[str]) -> None:
         pdf.text_lines(line, BODY, indent=BULLET_INDENT)
 
 
-def _add_pictures(pdf: _Document, pngs: Sequence[bytes], caption: str, highest: float) -> None:
-    """Add pictures of one size side by side, reduced if they then fit on the page."""
-    images = [Image.open(io.BytesIO(png)).convert("RGB") for png in pngs]
-    room = (pdf.epw - (len(images) - 1) * GAP) / len(images)
-    below = 3 * SMALL * LEADING if caption else 0.0
-    height = min(highest, room * images[0].height / images[0].width)
+def _add_picture(pdf: _Document, picture: Picture, highest: float) -> None:
+    """Add a picture with its caption, reduced if it then fits on the page."""
+    image = Image.open(io.BytesIO(picture.png)).convert("RGB")
+    below = 3 * SMALL * LEADING
+    height = min(highest, pdf.epw * image.height / image.width)
     left_over = pdf.page_break_trigger - pdf.y - below - 1.0
     if LEAST_SHARE * height <= left_over:
         height = min(height, left_over)
-    width = height * images[0].width / images[0].height
+    width = height * image.width / image.height
     pdf.need(height + below)
     top = pdf.y
     pdf.set_draw_color(RULE)
-    for number, image in enumerate(images):
-        left = MARGIN + number * (width + GAP)
-        pdf.image(image, x=left, y=top, w=width, h=height)
-        pdf.rect(left, top, width, height)
+    pdf.image(image, x=MARGIN, y=top, w=width, h=height)
+    pdf.rect(MARGIN, top, width, height)
     pdf.set_y(top + height + 4.0)
-    if caption:
-        pdf.text_lines(caption, SMALL, color=SOFT_INK)
+    pdf.text_lines(picture.caption, SMALL, color=SOFT_INK)
 
 
 def _add_facts(pdf: _Document, facts: Facts) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
+from collections.abc import Generator, Iterator, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -24,7 +24,7 @@ from ...choosing.placement.returns_summary import (
 from ...site.candidates import PAPER_TYPES
 from ..pictures.drawing import percent
 from ..results.answer import Costs, costs_of, sentence
-from ..results.file_names import POSE_ERROR_PICTURES, TRAFFIC_PICTURES
+from ..results.file_names import POSE_ERROR_PICTURES, TRAFFIC_PICTURE
 from ..results.geographic_files import LOCATED_FILES
 from ..results.placement_record import RecordedSensor, relevant_warnings
 from ..results.verification_record import (
@@ -40,24 +40,20 @@ from ..results.verification_record import (
     signed_points,
     vehicles,
 )
-from .blind_spots import blind_spots, seen_places, seen_streets
+from .blind_spots import blind_spot_map, blind_spots, seen_places, seen_streets
 from .blocks import (
     Block,
     Bullets,
     Card,
-    Code,
     Facts,
     Paragraph,
     Picture,
-    Pictures,
     Report,
     Table,
     make_sections,
 )
 from .evidence import Evidence, load_evidence
-from .figures import blind_spot_map, front_chart
 from .pdf import save_report
-from .repeat import repeating_command
 from .wording import (
     date,
     dollars,
@@ -81,7 +77,6 @@ CAPTIONS = {
     "spread.png": "Coverage over draws of pose errors that were not used for choosing.",
     "blame.png": "What each sensor's errors, and each kind of error, cost on average.",
     "time_seen.png": "For which share of the time each part of the road is seen in traffic.",
-    "traffic.png": "The empty road and the road in traffic.",
 }
 COST_SOURCES = (
     "Installation costs: Florida DOT in the ITS Costs Database of the US DOT (2004) for posts, arms and power; AASHTO, "
@@ -110,7 +105,7 @@ def make_report(evidence: Evidence) -> Report:
         "Failures and errors": _losses(evidence),
         "How far the figures can be trusted": _trust(evidence),
         "Sources": _sources(evidence),
-        "Reproduction": _making(evidence),
+        "Reproduction": [Facts(tuple(_settings(evidence)))],
     }
     subtitle = f"Positions of roadside LiDAR sensors, {date(record.times.created)}"
     first = tuple(_first_page(evidence, costs))
@@ -273,17 +268,11 @@ def _sensors(evidence: Evidence, costs: Costs) -> Iterator[Block]:
         f"altitudes count from {zero}."
     )
     yield Paragraph(
-        "Heights and coordinates are those of the optical centre. On the plans north is up, and small circles are "
-        f"other possible posts. {system} Before work begins, check ownership, foundations, power and underground lines "
-        "on site."
+        f"Heights and coordinates are those of the optical centre. {system} Before work begins, check ownership, "
+        "foundations, power and underground lines on site."
     )
-    for number, (sensor, items) in enumerate(zip(evidence.sensors, costs.items, strict=True)):
-        pictures = evidence.close_ups[number] if number < len(evidence.close_ups) else ()
-        blocks: list[Paragraph | Facts | Pictures] = []
-        if pictures:
-            blocks.append(Pictures(pictures, f"Close-up of {sensor.id} on the plan and in the view."))
-        blocks.append(Facts(tuple(_sensor_facts(evidence, sensor, items))))
-        yield Card(f"{sensor.id}  {sensor.sensor_name}", tuple(blocks))
+    for sensor, items in zip(evidence.sensors, costs.items, strict=True):
+        yield Card(f"{sensor.id}  {sensor.sensor_name}", (Facts(tuple(_sensor_facts(evidence, sensor, items))),))
 
 
 def _sensor_facts(evidence: Evidence, sensor: RecordedSensor, items: Mapping[str, float]) -> Iterator[tuple[str, str]]:
@@ -357,7 +346,9 @@ def _blind_spots(evidence: Evidence) -> Iterator[Block]:
     if evidence.record.returns is not None:
         yield Paragraph(SURFACE_SEEN)
     yield Picture(
-        blind_spot_map(evidence, shown),
+        blind_spot_map(
+            evidence.site.targets, evidence.seen_by, shown, evidence.sensors, evidence.record.site.attribution
+        ),
         "Orange is not seen, light blue seen by one sensor, dark blue by two or more. Triangles are sensors, numbers "
         "the blind spots of the table.",
     )
@@ -430,41 +421,33 @@ def _weighted_share(evidence: Evidence) -> float:
 
 
 def _front(evidence: Evidence) -> Iterator[Block]:
-    """Yield the chart and the table of the best placements by number of sensors."""
+    """Yield the table of the best placements by number of sensors."""
     record, returns, budget = evidence.record, evidence.record.returns, evidence.record.request.goal.budget
-    text: Callable[[float], str] = (lambda value: percent(value / 100)) if returns is None else returns_text
     if returns is None:
+        weighted = ", by its weights" if np.ptp(evidence.site.problem.weights) > 0 else ""
+        measured, head = f"see these shares of the road{weighted}.", "Seen"
         rows = [
             (
-                *(point.count, 100 * point.coverage, 100 * point.missed, point.price),
+                *(point.count, point.price, percent(point.coverage)),
                 f"at most {points(point.missed)} more" if point.missed else "none sees more",
             )
             for point in record.front
         ]
-        weighted = ", by its weights" if np.ptp(evidence.site.problem.weights) > 0 else ""
-        measured, head, own = f"see these shares of the road{weighted}.", "Seen", 100 * _weighted_share(evidence)
-        label, highest = "road seen, %", 100.0
     else:
+        measured, head = "typically measure these numbers of points on a road user in each revolution.", "Points"
         rows = []
         for point in returns.front:
-            more = (1.0 + point.returns) * (point.gap or 0.0)  # gaps are shares of 1 + returns
             most = f"none has more than {returns_within(point.returns, point.gap)}" if point.gap else "none has more"
             words = "may have more" if point.gap is None else most
-            rows.append((point.count, point.returns, more, point.price, words))
-        measured = "typically measure these numbers of points on a road user in each revolution."
-        head, own, label = "Points", returns.typical, "typical points on a road user"
-        highest = max(value + more for _, value, more, *_ in rows)
+            rows.append((point.count, point.price, returns_text(point.returns), words))
     limit = "" if budget is None else f" The budget of {dollars(budget)} does not limit the choices of this table."
     yield Paragraph(
         "With fewer or more sensors under the same rules, regardless of price, the best choices found by a short "
         f"search {measured}{limit}"
     )
-    chart = front_chart([row[:3] for row in rows], (len(record.sensors), own), label, text, highest)
-    what = f"{label[:1].upper()}{label[1:].removesuffix(', %')} by number of sensors"
-    yield Picture(chart, f"{what}; a line above a point extends to what no choice can exceed, where that is proven.")
     yield Table(
         ("Sensors", "Price installed, $" if record.installed else "Price, $", head, "Other choices"),
-        tuple((str(count), f"{price:,.0f}", text(value), words) for count, value, _, price, words in rows),
+        tuple((str(count), f"{price:,.0f}", value, words) for count, price, value, words in rows),
         frozenset({0, 1, 2}),
     )
 
@@ -501,7 +484,7 @@ def _losses(evidence: Evidence) -> Iterator[Block]:
             errors.append("Points on road users have an allowance for vehicles that block the view on average.")
     if errors:
         yield Bullets(tuple(errors))
-    for name in (*POSE_ERROR_PICTURES, *TRAFFIC_PICTURES):
+    for name in (*POSE_ERROR_PICTURES, TRAFFIC_PICTURE):
         if name in evidence.pictures:
             yield Picture(evidence.pictures[name], CAPTIONS[name])
 
@@ -550,17 +533,6 @@ def _sources(evidence: Evidence) -> Iterator[Block]:
     if record.site.assumptions:
         yield Paragraph("What was assumed or left out when the scene was built from the map:")
         yield Bullets(tuple(sentence(note) for note in record.site.assumptions))
-
-
-def _making(evidence: Evidence) -> Iterator[Block]:
-    record = evidence.record
-    command = repeating_command(record)
-    if command:
-        yield Paragraph("This command, run in the result folder, repeats the placement in another folder:")
-        yield Code(command)
-    else:
-        yield Paragraph("No single command repeats this placement.")
-    yield Facts(tuple(_settings(evidence)))
 
 
 def _settings(evidence: Evidence) -> Iterator[tuple[str, str]]:

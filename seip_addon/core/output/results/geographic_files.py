@@ -30,8 +30,6 @@ DECIMALS = 8  # of degrees: about a millimetre
 GAP = 0.06
 """Cracks in the region up to twice this (metres) are closed."""
 METRE_DECIMALS = 6  # to which the corners of squares are rounded, so that neighbours share theirs
-MOST_CELLS = 100_000
-"""Targets up to which each has a cell of its own, in some 30 MB; beyond, those that the same sensors see are joined."""
 NAMESPACE = "http://www.opengis.net/kml/2.2"
 KML_STYLES = {
     "unseen": ("", SEEN_COLOURS[0], 0x90),
@@ -70,16 +68,6 @@ class Located:
         """The sensors, in the order of the points."""
         return self.deployment.sensors
 
-    def squares(self) -> Float:
-        """Return the corners of the square of road round each target, (t, 4, 2) degrees, counter-clockwise."""
-        corners = target_squares(self.site.targets).reshape(-1, 3)
-        return _degrees(self.site, corners).reshape(-1, 4, 2)
-
-    def seers(self, target: int) -> list[str]:
-        """Return the labels of the sensors that see a target."""
-        rows = self.deployment.rows
-        return [sensor.label for sensor, row in zip(self.sensors, rows, strict=True) if row[target]]
-
     def patches(self) -> Iterator[tuple[list[str], tuple[shapely.Polygon, ...]]]:
         """Yield for each set of sensors, by their labels, the road that these see and no others."""
         squares = np.round(target_squares(self.site.targets)[:, :, :2], METRE_DECIMALS)
@@ -88,7 +76,8 @@ class Located:
         for number in range(len(sets)):
             own = which.ravel() == number
             area = shapely.coverage_union_all(shapely.polygons(squares[own]))
-            yield self.seers(int(np.argmax(own))), _polygons(self.site, area)
+            seers = [sensor.label for sensor, sees in zip(self.sensors, sets[number], strict=True) if sees]
+            yield seers, _polygons(self.site, area)
 
 
 def located(geometry: SceneGeometry, site: Site, deployment: Deployment) -> Located | None:
@@ -151,14 +140,8 @@ def _features(placed: Located) -> Iterator[Feature]:
     yield feature("region of interest", *_multipolygon(placed.region), name=placed.site.name)
     for area, polygons in placed.weighted:
         yield feature("weighted region", *_multipolygon(polygons), name=area.name, weight=area.weight)
-    if len(placed.site.targets) > MOST_CELLS:
-        for seers, polygons in placed.patches():
-            yield feature("coverage patch", *_multipolygon(polygons), seen_by=seers, times_seen=len(seers))
-        return
-    for target, square in enumerate(placed.squares().tolist()):
-        seers = placed.seers(target)
-        ring = [[*square, square[0]]]
-        yield feature("coverage cell", "Polygon", ring, target=target, seen_by=seers, times_seen=len(seers))
+    for seers, polygons in placed.patches():
+        yield feature("coverage patch", *_multipolygon(polygons), seen_by=seers, times_seen=len(seers))
 
 
 def _multipolygon(polygons: Sequence[shapely.Polygon]) -> tuple[str, object]:

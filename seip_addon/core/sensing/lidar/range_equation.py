@@ -31,7 +31,6 @@ import numpy as np
 from ...base.arrays import Float
 from ...base.errors import SeipError
 from ...base.limits import DETECTION_RANGE, DETECTION_SPREAD, DETECTION_THRESHOLD, EXTINCTION, POSITIVE_SHARE, Limits
-from .carla_dropoff import CarlaDropoff
 
 CEILING = 0.985
 SPREAD = 0.9
@@ -39,9 +38,6 @@ SPREAD = 0.9
 
 MAKER_PROBABILITY = 0.9
 """Probability of detection for ranges of data sheets that state none."""
-
-DROPOFF_REFLECTIVITY = 0.2
-"""Reflectivity, between asphalt and walls, for which `RangeEquation.as_dropoff` is correct."""
 
 # Least ratio of the ranges at 80 and at 10 %. At this ratio the air would transmit only 1/178 of the light on the way
 # to the shorter range and back. A smaller ratio implies even more extinction; data sheets are measured in clear air.
@@ -132,16 +128,6 @@ class RangeEquation:
     def amplified(self, gain: float) -> RangeEquation:
         """Return the law of a sensor that receives ``gain`` times the power."""
         return replace(self, threshold=self.threshold - math.log(gain))
-
-    def as_dropoff(self) -> CarlaDropoff:
-        """Return the drop-off with the same losses at two ranges, for a surface of `DROPOFF_REFLECTIVITY`.
-
-        They agree at the ranges where 0.9 and 0.5 of the ceiling are detected from a surface that faces the sensor.
-        CARLA's intensity exp(−a · r) depends on neither reflectivity nor angle.
-        """
-        near, far = (self.reach(DROPOFF_REFLECTIVITY, share * self.ceiling) for share in (0.9, 0.5))
-        attenuation = math.log(0.9 / 0.5) / (far - near)
-        return CarlaDropoff(attenuation, 1.0 - self.ceiling, min(1.0, math.exp(-attenuation * near) / 0.9), 1.0)
 
     def strength(self, distance: Float, reflected: Float) -> Float:
         """Return p in 1/m² of hits: 0 at infinite distance, infinite at distance zero.

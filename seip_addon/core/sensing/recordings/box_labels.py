@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -36,7 +35,7 @@ _Box = tuple[str, list[Any]]
 
 @dataclass(frozen=True, eq=False)
 class BoxLabels:
-    """Labelled boxes of one sweep.
+    """Labelled boxes of one sweep; those of other classes are left out.
 
     Parameters
     ----------
@@ -45,13 +44,10 @@ class BoxLabels:
         in the axes of the file.
     category : (k,) str
         One of `CATEGORIES` for each box.
-    ignored : dict of str to int
-        Number of boxes of each other class, which are left out.
     """
 
     boxes: Float
     category: Text
-    ignored: dict[str, int]
 
     def __len__(self) -> int:
         return len(self.boxes)
@@ -78,15 +74,12 @@ def read_labels(path: Path) -> BoxLabels:
 
 
 def _labels(boxes: Iterable[_Box]) -> BoxLabels:
-    ignored: Counter[str] = Counter()
     rows, categories = [], []
     for name, row in boxes:
         category = _CATEGORY.get(re.sub(r"[\W_]", "", name.lower()))
-        if category is None:
-            ignored[name] += 1
-            continue
-        rows.append([float(number) for number in row])
-        categories.append(category)
+        if category is not None:
+            rows.append([float(number) for number in row])
+            categories.append(category)
     table = np.array(rows, dtype=np.float64).reshape(-1, 7)
     checks = {
         "the middle of a box": (table[:, :3], SENSOR_COORDINATE),
@@ -96,7 +89,7 @@ def _labels(boxes: Iterable[_Box]) -> BoxLabels:
     if fault := Limits.first_fault(checks):
         raise ValueError(fault)
     table[:, 6] = np.mod(table[:, 6] + np.pi, 2 * np.pi) - np.pi
-    return BoxLabels(table, np.array(categories, dtype=np.str_), dict(ignored))
+    return BoxLabels(table, np.array(categories, dtype=np.str_))
 
 
 def _boxes(text: str) -> Iterator[_Box]:

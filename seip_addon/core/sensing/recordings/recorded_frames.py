@@ -26,7 +26,7 @@ from .comparison import MOST_VEHICLE_HEIGHT, NEARER, RayComparison, compare_rays
 from .ground import estimated_ground, pose_above_ground
 from .recording import Recording, SensorRecording, paired
 from .registration import register
-from .sweep import Sweep
+from .sweep_files import Sweep
 
 ROAD_REFLECTIVITY = 0.17
 """Reflectivity of the road near the sensor, by which intensities are scaled: that of dry asphalt."""
@@ -136,7 +136,7 @@ class RecordedFrames:
             parts.append({"points": points, "intensity": intensity, "foreground": foreground, "sensor": sensors})
         merged = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
         count = len(merged["points"])
-        boxes = labels or BoxLabels(np.zeros((0, 7)), np.zeros(0, dtype=np.str_), {})
+        boxes = labels or BoxLabels(np.zeros((0, 7)), np.zeros(0, dtype=np.str_))
         instance = _instances(merged["points"], boxes.boxes)
         return Frame(
             time=self.time(number),

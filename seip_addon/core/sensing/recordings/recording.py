@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -14,8 +14,7 @@ from ...base.arrays import Float, Integer
 from ...base.errors import SeipError
 from ...base.limits import FRAMES, ROTATION_RATE, TIME
 from ...storage.files import natural_order, read_small
-from .sweep import Sweep
-from .sweep_files import read_sweep, sweep_suffix
+from .sweep_files import Sweep, read_sweep, sweep_suffix
 
 MERGED = "merged"  # folder of the clouds of all sensors together, in datasets of `seip simulate --format pcd`
 TIMES_FILE = "timestamps.txt"
@@ -56,7 +55,7 @@ class SensorRecording:
         SeipError
             Its file is damaged.
         """
-        return replace(read_sweep(self.paths[number]), time=float(self.times[number]))
+        return read_sweep(self.paths[number])
 
 
 @dataclass(frozen=True, eq=False)

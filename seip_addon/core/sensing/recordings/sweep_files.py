@@ -1,8 +1,9 @@
-"""Readers of sweeps: PCD, KITTI's binary files, and npz."""
+"""Sweeps, and their readers: PCD, KITTI's binary files, and npz."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -11,10 +12,11 @@ from numpy.typing import NDArray
 
 from ...base.arrays import Float
 from ...base.errors import SeipError
+from ...base.limits import MAP_NUMBER, SENSOR_COORDINATE, SWEEP_POINTS
+from ...geometry.orientation import rotated
 from ...storage.array_file import read_npz
 from ...storage.files import read_small
 from .pcd_file import read_pcd
-from .sweep import Sweep, sweep_of
 
 MAX_BYTES = 1 << 30  # largest size of the file of a sweep
 _BIN_COLUMNS = (4, 5, 6)  # of a .bin: KITTI's four, and a ring and a time
@@ -22,11 +24,30 @@ _BIN_COLUMNS = (4, 5, 6)  # of a .bin: KITTI's four, and a ring and a time
 Columns = dict[str, NDArray[Any]]
 
 _CURE = "export the sweep again"
-_NAMES = {
-    "intensity": ("intensity", "i", "reflectivity"),
-    "time": ("time",),
-}
-"""Names of each column in files, the preferred one first."""
+_INTENSITY = ("intensity", "i", "reflectivity")
+"""Names of the column of intensities in files, the preferred one first."""
+
+
+@dataclass(frozen=True, eq=False)
+class Sweep:
+    """Returns of one sensor in one revolution.
+
+    Parameters
+    ----------
+    points : (n, 3) float32, metres
+        Finite points in the sensor's axes (x forward, y left, z up), none of them (0, 0, 0).
+    intensity : (n,) float32, optional
+        Intensity in the unit of the file.
+    viewpoint : (4, 4) float64, optional
+        Pose of the sensor in the axes of the file, if the file states one that is not the identity.
+    """
+
+    points: NDArray[np.float32]
+    intensity: NDArray[np.float32] | None = None
+    viewpoint: Float | None = None
+
+    def __len__(self) -> int:
+        return len(self.points)
 
 
 def sweep_suffix(path: Path) -> str:
@@ -39,7 +60,7 @@ def read_sweep(path: Path) -> Sweep:
     """Read a sweep in the format of the file's suffix.
 
     ``.bin`` holds four to six float32 for each point, of which x, y, z and intensity are read (KITTI). Point clouds
-    with named columns need ``x``, ``y`` and ``z``; the names of intensity are those of `_NAMES`.
+    with named columns need ``x``, ``y`` and ``z``; the names of intensity are those of `_INTENSITY`.
 
     Raises
     ------
@@ -55,7 +76,32 @@ def read_sweep(path: Path) -> Sweep:
         raise SeipError(f"{path.name} is not a text file; {_CURE}") from error
     except ValueError as error:
         raise SeipError(f"{path.name} is damaged or not a sweep ({str(error)[:200]}); {_CURE}") from error
-    return sweep_of(path.name, columns, viewpoint)
+    return _sweep_of(path.name, columns, viewpoint)
+
+
+def _sweep_of(file: str, columns: Columns, viewpoint: Float | None) -> Sweep:
+    """Return the sweep of a file without its missing returns, which are not finite or (0, 0, 0).
+
+    Columns are ``x``, ``y``, ``z`` in the axes of the file, and ``intensity`` if it is known. With a viewpoint, points
+    are transformed into the sensor's axes.
+    """
+    SWEEP_POINTS.require(len(columns["x"]), file, "number of points", "export one revolution to a file")
+    points = np.column_stack([columns[axis].astype(np.float64) for axis in "xyz"])
+    kept = np.isfinite(points).all(axis=1) & points.any(axis=1)
+    points = points[kept]
+    if viewpoint is not None:
+        with np.errstate(over="ignore", invalid="ignore"):  # what overflows is refused below
+            points = rotated(points - viewpoint[:3, 3], viewpoint[:3, :3].T)
+    if not SENSOR_COORDINATE.allow(points):
+        raise SeipError(
+            f"{file} has points more than 10 km from the sensor, which looks like map coordinates: export points "
+            "in the sensor's axes"
+        )
+    intensity = columns["intensity"][kept] if "intensity" in columns else None
+    if intensity is not None:
+        MAP_NUMBER.require(intensity, file, "intensity")
+        intensity = intensity.astype(np.float32)
+    return Sweep(points.astype(np.float32), intensity, viewpoint)
 
 
 def _pcd(path: Path) -> tuple[Columns, Float | None]:
@@ -75,9 +121,8 @@ def _found(path: Path, names: Sequence[str]) -> dict[str, str]:
     if missing:
         raise SeipError(f"{path.name} has no {' and no '.join(missing)}: name the columns of the coordinates x, y, z")
     found = {axis: axis for axis in "xyz"}
-    for column, known in _NAMES.items():
-        if name := next((name for name in known if name in names), None):
-            found[column] = name
+    if name := next((name for name in _INTENSITY if name in names), None):
+        found["intensity"] = name
     return found
 
 
@@ -103,11 +148,9 @@ def _npz(path: Path) -> tuple[Columns, None]:
         points = arrays.pop("points")
         if points.ndim != 2 or not 3 <= points.shape[1] <= 6:
             raise ValueError(f"points has the shape {points.shape}, not (n, 3 to 6)")
-        arrays |= dict(zip(("x", "y", "z", "intensity", "ring", "time"), points.T, strict=False))
+        arrays |= dict(zip(("x", "y", "z", "intensity"), points.T, strict=False))
     columns = {name: arrays[found] for name, found in _found(path, list(arrays)).items()}
     count = columns["x"].size
-    if columns.get("time", columns["x"]).shape == ():  # of the whole sweep
-        columns["time"] = np.repeat(columns["time"], count)
     for name, column in columns.items():
         if column.dtype.kind not in "fiu" or column.shape != (count,):
             raise ValueError(f"{name} is not an array of numbers, one for each point")

@@ -14,14 +14,11 @@ from ..traffic.bodies import fitted_body
 from ..traffic.trajectories import WARM_UP, Snapshot, Trajectories
 
 BATCH_SECONDS = 12.0  # seconds of a run whose instants count as one draw, since the same queues block the view
-_MARGIN = 1e-3  # metres by which bounding boxes are larger than their contents: ray casters compute in float32
-
-_CORNERS = np.array(np.meshgrid((0, 1), (0, 1), (0, 1), indexing="ij")).reshape(3, 8).T
 
 
 @dataclass(frozen=True, eq=False)
 class TrafficObstacles:
-    """Bodies of the k road users present at one instant; n triangles together.
+    """Bodies of the road users present at one instant; n triangles together.
 
     Parameters
     ----------
@@ -29,16 +26,13 @@ class TrafficObstacles:
         Corners of the bodies' triangles, local site axes.
     reflectivity : (n,) float64, 0 to 1
         Reflectivity of each triangle.
-    hulls : (k, 8, 3) float64, metres
-        Corners of their bounding boxes.
     """
 
     triangles: Float
     reflectivity: Float
-    hulls: Float
 
 
-NO_TRAFFIC = TrafficObstacles(np.empty((0, 3, 3)), np.empty(0), np.empty((0, 8, 3)))  # the empty road
+NO_TRAFFIC = TrafficObstacles(np.empty((0, 3, 3)), np.empty(0))  # the empty road
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,12 +105,9 @@ def obstacles_of(trajectories: Trajectories, snapshot: Snapshot) -> TrafficObsta
     if len(snapshot) == 0:
         return NO_TRAFFIC
     attitudes = rotations(snapshot.yaw, snapshot.pitch)
-    triangles, reflectivity, hulls = [], [], []
+    triangles, reflectivity = [], []
     for user, position, attitude in zip(snapshot.user.tolist(), snapshot.position, attitudes, strict=True):
         body = fitted_body(trajectories.users[user])
-        own = body.triangles
-        low, high = own.min(axis=(0, 1)) - _MARGIN, own.max(axis=(0, 1)) + _MARGIN
-        triangles.append(position + own @ attitude.T)
+        triangles.append(position + body.triangles @ attitude.T)
         reflectivity.append(body.reflectivity)
-        hulls.append(position + (low + _CORNERS * (high - low)) @ attitude.T)
-    return TrafficObstacles(np.concatenate(triangles), np.concatenate(reflectivity), np.array(hulls))
+    return TrafficObstacles(np.concatenate(triangles), np.concatenate(reflectivity))

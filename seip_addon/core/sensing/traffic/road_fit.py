@@ -9,9 +9,9 @@ import shapely
 from ...base.arrays import Boolean, Float, Integer
 from ...base.counts import counted
 from ...base.errors import SeipError
+from ...geometry.plan import MIN_AREA, heights_over, plane_height, signed_area
 from ...site.scene_geometry import SceneGeometry, joined
 from .floating_car_data import listed, unwrapped
-from .road_surface import ROAD_TOLERANCE, RoadSurface
 from .smooth_walks import out_of_reach
 from .trajectories import LoadedTraffic, RoadUser, Trajectories
 
@@ -20,6 +20,45 @@ MAX_GAP = 2.5  # sampling intervals; if samples are farther apart, the road user
 
 _DIGITS = {"time": 3, "position": 3, "yaw": 4, "pitch": 4, "speed": 2}
 """Decimal places of each array: a millimetre and a ten-thousandth of a radian, the precision of simulations."""
+
+ROAD_TOLERANCE = 1.0
+"""Largest distance in plan, metres, between the centre of a road user that is on the road and the road.
+
+A bus of 12 m, which simulations move like a rod on its lane, cuts a tight corner by up to this distance.
+"""
+
+
+class RoadSurface:
+    """Triangles (n, 3, 3) that road users can stand on."""
+
+    def __init__(self, triangles: Float) -> None:
+        self._triangles = triangles[np.abs(signed_area(triangles)) > MIN_AREA]
+        self._tree = shapely.STRtree(shapely.polygons(self._triangles[:, :, :2]))
+
+    def height(self, plan: Float, hint: Float) -> Float:
+        """Return the height (n,) of the surface at points (n, 2), nearest to a hint (n,); NaN off the road."""
+        point, heights = heights_over(plan, self._triangles)
+        height = _nearest_heights(len(plan), point, heights, hint)
+        beside = np.flatnonzero(np.isnan(height))
+        places = shapely.points(plan[beside])
+        number, triangle = self._tree.query_nearest(places, max_distance=ROAD_TOLERANCE)
+        nearest = shapely.get_coordinates(
+            shapely.get_point(shapely.shortest_line(self._tree.geometries[triangle], places[number]), 0)
+        )
+        heights = plane_height(self._triangles[triangle], nearest)
+        height[beside] = _nearest_heights(len(beside), number, heights, hint[beside])
+        return height
+
+
+def _nearest_heights(count: int, point: Integer, heights: Float, hint: Float) -> Float:
+    """Return for each point the height that is nearest to its hint, or the highest if the hint is NaN."""
+    wanted = np.where(np.isnan(hint[point]), np.inf, hint[point])
+    badness = np.where(np.isinf(wanted), -heights, np.abs(heights - wanted))
+    order = np.lexsort((badness, point))
+    first = np.unique(point[order], return_index=True)[1]
+    height = np.full(count, np.nan)
+    height[point[order][first]] = heights[order][first]
+    return height
 
 
 def fit_to_road(trajectories: Trajectories, geometry: SceneGeometry) -> LoadedTraffic:

@@ -9,7 +9,7 @@ from shapely.geometry.base import BaseGeometry
 
 from ...base.errors import SeipError
 from ...site.scene_geometry import SceneGeometry, joined
-from .road_surface import ROAD_TOLERANCE, RoadSurface
+from .road_fit import ROAD_TOLERANCE, RoadSurface
 from .trajectories import Trajectories
 
 MAX_REGION_DISTANCE = 500.0  # metres from the region beyond which traffic belongs to another site

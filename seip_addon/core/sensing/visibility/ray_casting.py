@@ -81,16 +81,13 @@ def engine_name(engine: Engine) -> Engine:
     return engine
 
 
-def make_ray_caster(triangles: Float, engine: Engine = "auto", keep: Boolean | None = None) -> RayCaster:
+def make_ray_caster(triangles: Float, engine: Engine = "auto") -> RayCaster:
     """Build a ray caster; see `engine_name` for ``auto``.
 
     Parameters
     ----------
     triangles : (n, 3, 3) float64, metres
     engine : {"auto", "bvh", "embree"}
-    keep : (n,) bool, optional
-        Triangles that stop rays; all by default. For a ray that meets only triangles of a subset, the result is
-        identical whichever others are kept.
 
     Raises
     ------
@@ -107,9 +104,9 @@ def make_ray_caster(triangles: Float, engine: Engine = "auto", keep: Boolean | N
     """
     name = engine_name(engine)
     if name == "embree":
-        return EmbreeRayCaster(triangles, keep)
+        return EmbreeRayCaster(triangles)
     if name == "bvh":
-        return BvhRayCaster(triangles, keep)
+        return BvhRayCaster(triangles)
     raise SeipError(f"unknown ray-casting engine '{engine}'; choose auto, bvh or embree")
 
 
@@ -120,13 +117,11 @@ class BvhRayCaster:
     ----------
     triangles : (n, 3, 3) float64, metres
         Corners of the triangles.
-    keep : (n,) bool, optional
-        Triangles that stop rays; all by default.
     """
 
     threads = 1  # casting a ray holds Python's lock
 
-    def __init__(self, triangles: Float, keep: Boolean | None = None) -> None:
+    def __init__(self, triangles: Float) -> None:
         try:
             from mathutils.bvhtree import BVHTree  # noqa: PLC0415 - exists only within Blender's Python
         except ImportError as error:
@@ -134,7 +129,7 @@ class BvhRayCaster:
                 "the ray-casting engine bvh needs Blender's Python: run within Blender, or import bpy first"
             ) from error
         self.triangles = triangles
-        self._index, self._centre, corners = _rebased(triangles, keep)
+        self._index, self._centre, corners = _rebased(triangles)
         with _no_garbage_collection():  # otherwise it walks the growing lists repeatedly
             points = corners.reshape(-1, 3).tolist()
             faces = np.arange(len(points)).reshape(-1, 3).tolist()
@@ -159,20 +154,18 @@ class EmbreeRayCaster:
     ----------
     triangles : (n, 3, 3) float64, metres
         Corners of the triangles.
-    keep : (n,) bool, optional
-        Triangles that stop rays; all by default.
     """
 
     threads = MAX_THREADS
 
-    def __init__(self, triangles: Float, keep: Boolean | None = None) -> None:
+    def __init__(self, triangles: Float) -> None:
         try:
             from embreex.mesh_construction import TriangleMesh  # noqa: PLC0415 - an extra that need not be installed
             from embreex.rtcore_scene import EmbreeScene  # noqa: PLC0415 - as above
         except ImportError as error:
             raise SeipError("the ray-casting engine embree is not installed; choose bvh or install embreex") from error
         self.triangles = triangles
-        self._index, self._centre, corners = _rebased(triangles, keep)
+        self._index, self._centre, corners = _rebased(triangles)
         self._scene = EmbreeScene(_embree_device(), robust=True)  # robust: no leaks along shared edges
         self._mesh = TriangleMesh(self._scene, corners.astype(np.float32)) if len(corners) else None
         self._needle = _needles(corners)
@@ -206,11 +199,10 @@ def _embree_device() -> object:
     return EmbreeDevice()
 
 
-def _rebased(triangles: Float, keep: Boolean | None) -> tuple[Integer, Float, Float]:
-    """Select the triangles that are kept and have an area, and move them to the common centre of all.
+def _rebased(triangles: Float) -> tuple[Integer, Float, Float]:
+    """Select the triangles that have an area, and move them to the common centre of all.
 
-    Both engines compute in float32, whose error is metres at map coordinates. The centre does not depend on the
-    selection, so that the rounding does not either.
+    Both engines compute in float32, whose error is metres at map coordinates.
 
     Returns
     -------
@@ -232,7 +224,7 @@ def _rebased(triangles: Float, keep: Boolean | None) -> tuple[Integer, Float, Fl
     centre = (points.min(axis=0) + points.max(axis=0)) / 2
     corners = triangles - centre
     area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
-    index = np.flatnonzero(area > 0 if keep is None else (area > 0) & keep)
+    index = np.flatnonzero(area > 0)
     return index, centre, corners[index]
 
 

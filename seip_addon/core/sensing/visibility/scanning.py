@@ -21,7 +21,6 @@ from .beam_culling import NearRays, may_return, near_rays
 from .near_surfaces import NearSurfaces
 from .ray_casting import RayCaster
 from .settings import VisibilitySettings
-from .target_index import TargetIndex, is_within, squared_length
 
 _PAIRS_AT_ONCE = 1 << 18  # of rays and surfaces: bounds the memory at borders of surfaces
 
@@ -128,36 +127,17 @@ class ScanPosition:
             strong[ray[model.law.strength(distance[ray], reflected) < least]] = False
         return strong
 
-    def pairs_seen(
-        self,
-        directions: Float,
-        distance: Float,
-        triangle: Integer,
-        surfaces: NearSurfaces,
-        index: TargetIndex,
-    ) -> tuple[Integer, Integer]:
-        """Return each ray with each target that its return sees, from the hits of n rays.
 
-        Parameters
-        ----------
-        directions, distance, triangle : (n, 3) and (n,) float64, (n,) int64
-            Directions of the rays, and their hits.
-        surfaces : NearSurfaces
-            Surfaces near the targets.
-        index : TargetIndex
-            Index of the targets.
+def squared_length(gap: Float) -> Float:
+    """Return squared lengths of vectors, (n,) from (n, 3), always summed in the same order, so that bits agree."""
+    squared: Float = gap[:, 0] ** 2 + gap[:, 1] ** 2 + gap[:, 2] ** 2
+    return squared
 
-        Returns
-        -------
-        ray, target : (p,) int64
-            Indices of the pairs, rays ascending.
-        """
-        # A return may see several targets, and the strength at borders depends on the target's surfaces: pairs of both
-        returns = np.flatnonzero(self.counting(directions, distance, triangle))
-        directions, distance = directions[returns], distance[returns]
-        ray, target = index.pairs_within_delta(self.origin + distance[:, None] * directions)
-        strong = self.counting_at_borders(surfaces, directions[ray], distance[ray], target)
-        return returns[ray[strong]], target[strong]
+
+def is_within(squared_distance: Float, delta: float) -> Boolean:
+    """Return whether returns at squared distances from targets see them: whether they are nearer than δ."""
+    near: Boolean = squared_distance < delta**2
+    return near
 
 
 def seen_by_near_rays(position: ScanPosition, surfaces: NearSurfaces) -> tuple[Boolean, int]:

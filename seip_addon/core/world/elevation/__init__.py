@@ -1,1 +1,1 @@
-"""Heights of the ground, and what stands on it, from elevation models and laser surveys."""
+"""Heights of the ground from elevation models."""

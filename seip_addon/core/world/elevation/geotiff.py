@@ -13,9 +13,10 @@ from ...base.arrays import Float
 from ...base.errors import SeipError
 from ...base.limits import GROUND, LATITUDE, LONGITUDE, MAP_COORDINATE, Limits
 from ...geometry.height_raster import bilinear
-from ...geometry.reference_systems import GEOGRAPHIC
 from ...site.sources import one_line
 
+GEOGRAPHIC = (4326, 4258)
+"""EPSG codes of longitude and latitude in degrees, on WGS 84 and on ETRS89."""
 MAX_PIXELS = 150_000_000
 MAX_PIXELS_PER_BYTE = 1032  # in compressed files: more than DEFLATE achieves with pixels of any type
 SMALL = 1_000_000

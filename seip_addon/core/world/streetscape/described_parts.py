@@ -29,7 +29,6 @@ def described_parts(description: SiteDescription, street: SiteGround) -> list[Pa
     parts: list[Part] = []
     for number, building in enumerate(description.buildings, start=1):
         parts += _building_parts(building, numbered("Building"), number, street)
-    parts += [Part(numbered(one.name), one.solid, (Role.OCCLUDERS,), source=one.source) for one in description.solids]
     for wall in description.walls:
         foot = _on_ground(wall.line, street) + np.array([0.0, 0.0, wall.base])
         panels = fence(foot, np.full(len(foot), wall.height), wall.thickness, side=wall.material)

@@ -3,26 +3,21 @@
 Its use is shown in `tests/core/world/streetscape/test_site_model.py`.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-import shapely
 from shapely import MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from ...base.arrays import Float
-from ...geometry.plan import covered_share
-from ...geometry.solids import Solid
 from ...site.post_rules import KeepOffArea, RuleName
-from ...site.scene_geometry import DESCRIBED, FROM_EXTRACT, FROM_MAP
+from ...site.scene_geometry import DESCRIBED, FROM_MAP
 from .terrain import Relief
 
 DEFAULT_RADIUS = 80.0
 
-MAX_COVERED = 0.5  # share of a building's outline covered by another source, above which that one replaces it
-OBJECT_FIELDS = ("buildings", "trees", "walls", "street_lights", "signal_poles", "slabs", "posts", "solids")
+OBJECT_FIELDS = ("buildings", "trees", "walls", "street_lights", "signal_poles", "slabs", "posts")
 """Fields of a description with objects that stand at the place."""
 PLACED_FIELDS = (*OBJECT_FIELDS, "ways", "forbidden_areas", "mandatory_areas", "keep_off_areas")
 """Fields of a description with objects and areas in map coordinates."""
@@ -141,31 +136,6 @@ class Slab:
 
 
 @dataclass(frozen=True, eq=False)
-class PlacedSolid:
-    """A solid from a separate file, such as a survey.
-
-    Parameters
-    ----------
-    name : str
-        Kind of the solid, such as ``Building``.
-    solid : Solid
-        Shape in map coordinates.
-    outline : shapely geometry
-        Outline in plan, map coordinates.
-    source : str
-        See `Building`.
-    is_building : bool
-        Whether it replaces buildings of the map and of an extract.
-    """
-
-    name: str
-    solid: Solid
-    outline: BaseGeometry
-    source: str
-    is_building: bool = True
-
-
-@dataclass(frozen=True, eq=False)
 class SideWay:
     """A footway, cycle track or driveway that is not part of the road.
 
@@ -219,8 +189,6 @@ class SiteDescription:
         Objects and areas listed in the file.
     slabs, posts, ways : tuple
         Plates, plain posts, and ways next to the road, from an extract.
-    solids : tuple of PlacedSolid
-        Solids from a survey; buildings among them replace those of the map.
     keep_off_areas : tuple of KeepOffArea
         Areas from which rules exclude new posts, map coordinates.
     relief : Relief or None
@@ -255,7 +223,6 @@ class SiteDescription:
     slabs: tuple[Slab, ...] = ()
     posts: tuple[Poles, ...] = ()
     ways: tuple[SideWay, ...] = ()
-    solids: tuple[PlacedSolid, ...] = ()
     keep_off_areas: tuple[KeepOffArea, ...] = ()
     relief: Relief | None = None
     roundabouts: tuple[frozenset[str], ...] = ()
@@ -284,16 +251,3 @@ class SiteDescription:
         if self.junction is None or self.region is not None or self.radius is not None:
             return None
         return DEFAULT_RADIUS if self.approaches is None else self.approaches
-
-
-def without_covered_buildings(
-    description: SiteDescription, solids: Sequence[PlacedSolid]
-) -> tuple[SiteDescription, int]:
-    """Return a description without buildings of an extract that `solids` cover, and the number of these."""
-    tree = shapely.STRtree([one.outline for one in solids if one.is_building])
-    kept = tuple(
-        one
-        for one in description.buildings
-        if one.source != FROM_EXTRACT or covered_share(one.outline, tree) <= MAX_COVERED
-    )
-    return replace(description, buildings=kept), len(description.buildings) - len(kept)

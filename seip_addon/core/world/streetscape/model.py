@@ -12,8 +12,7 @@ from ...base.arrays import Float
 from ...base.counts import counted
 from ...base.errors import SeipError
 from ...base.progress import Progress
-from ...geometry.plan import covered_share, united, without
-from ...geometry.solids import Solid
+from ...geometry.plan import united, without
 from ...site.post_rules import RULES
 from ...site.roles import AREA_OVERLAYS, Role
 from ...site.scene_geometry import ASSUMED, NamedArea
@@ -21,12 +20,11 @@ from ...site.sources import SourceCount, count_sources
 from ..opendrive.objects import TUNNEL, PlacedObject, PlacedSignal, extent_in_plan
 from .clearing import clear
 from .described_parts import described_parts
-from .description import MAX_COVERED, PLACED_FIELDS, SiteDescription
+from .description import PLACED_FIELDS, SiteDescription
 from .intersections import ring_roads
 from .levels import MIN_LEVEL_HEIGHT, UNNAMED_ROAD, Levels
 from .map_furniture import CROWN_SHARE, is_trunk, landings, object_parts
-from .named_places import area_in_plan, named_places, street_names
-from .object_kinds import Kind, kind_of
+from .named_places import named_places, street_names
 from .parts import Part
 from .place import Place, shifted
 from .road_checks import road_warnings
@@ -134,7 +132,7 @@ def street_model(streets: StreetMap, description: SiteDescription) -> Generator[
     street = site_ground(streets, levels, origin, shifted(region, -origin), described)
     yield _step("objects")
     described, clear_notes = clear(described, street.roadside.carriageway, street.roadside.mouths)
-    objects, covered_notes = _without_covered(_map_objects(streets, street), described)
+    objects = _map_objects(streets, street)
     furniture = _furniture(objects, _map_signals(streets, street, levels), described, street)
     yield _step("carriageway")
     surface = street_surface(street)
@@ -163,7 +161,6 @@ def street_model(streets: StreetMap, description: SiteDescription) -> Generator[
         parts=tuple(_with_source(part, description) for part in parts if part.solid.faces),
         region=street.region,
         notes=(
-            *covered_notes,
             *_level_notes(levels),
             *clear_notes,
             *surface.notes,
@@ -203,8 +200,6 @@ def _local(item: Any, origin: Float) -> Any:  # noqa: ANN401  # of any dataclass
             moved[name] = shifted(value, -origin)
         elif isinstance(value, np.ndarray):
             moved[name] = value - origin[: value.shape[1]]
-        elif isinstance(value, Solid):
-            moved[name] = replace(value, vertices=value.vertices - origin)
     return replace(item, **moved)
 
 
@@ -258,24 +253,6 @@ def _overlay_parts(
         *_area_parts(described, street),
         *_keep_off_parts(described, objects, street),
     ]
-
-
-def _without_covered(
-    objects: tuple[PlacedObject, ...], described: SiteDescription
-) -> tuple[tuple[PlacedObject, ...], tuple[str, ...]]:
-    """Return the objects of a map without buildings that a survey contains, and a note on these."""
-    modelled = [one.outline for one in described.solids if one.is_building]
-    if not modelled:
-        return objects, ()
-    tree = shapely.STRtree(modelled)
-    kept = tuple(
-        one
-        for one in objects
-        if kind_of(one) is not Kind.BUILDING or covered_share(area_in_plan(one), tree) <= MAX_COVERED
-    )
-    count = len(objects) - len(kept)
-    note = f"{counted(count, 'building')} of the map replaced by those of the survey"
-    return kept, (note,) if count else ()
 
 
 def _with_source(part: Part, description: SiteDescription) -> Part:

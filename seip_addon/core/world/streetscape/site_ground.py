@@ -132,7 +132,6 @@ def site_ground(
 def _built_up(streets: StreetMap, lanes: Sequence[LaneSurface], description: SiteDescription) -> BaseGeometry:
     """Return the area of buildings on the ground and of the islands of roundabouts, local axes."""
     outlines = [one.outline for one in description.buildings if one.base < MIN_PASSAGE]
-    outlines += [one.outline for one in description.solids]
     rings = ring_roads(streets.road_map.roads, description.roundabouts)
     islands = enclosed([lane.polygon for lane in lanes if lane.road_id in rings])
     return united([islands, *outlines])

@@ -13,7 +13,7 @@ from ...geometry.solids import from_faces
 from ...site.roles import AREA_OVERLAYS, Role
 from ...site.scene_geometry import OTHER_LEVELS
 from . import road_surface
-from .description import Building, PlacedSolid, SiteDescription
+from .description import SiteDescription
 from .lane_markings import markings, stop_lines
 from .parts import Part
 from .road_surface import SNAP_GRID, SurfaceLayers, without_crumbs
@@ -201,9 +201,7 @@ def marking_part(street: SiteGround, *, has_signals: bool) -> Part:
 
 def side_way_parts(description: SiteDescription, street: SiteGround, laid: BaseGeometry) -> list[Part]:
     """Return ways next to the road by kind, without areas of lanes, buildings, other roads and laid surfaces."""
-    on_ground = [one for one in description.buildings if one.base < MIN_PASSAGE]
-    standing: list[Building | PlacedSolid] = [*on_ground, *description.solids]
-    houses = shapely.union_all([one.outline for one in standing])
+    houses = shapely.union_all([one.outline for one in description.buildings if one.base < MIN_PASSAGE])
     covered = [street.covered, street.roadside.filled, laid, houses, street.crossing.area]
     taken = shapely.union_all(covered).buffer(road_surface.MAX_SEAM)
     parts = []

@@ -153,3 +153,19 @@ def test_allocation_equals_enumeration_and_no_relaxed_one_is_worse(tables, budge
     lower = allocation_of(options, np.ones(len(options)), [parts[0] for parts in relaxed.taken])
     assert lower.price <= budget * (1 + 1e-6)
     assert lower.value <= max(within) * (1 + 1e-9)
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_bounds_of_a_frontier_hold_for_every_placement(seed):
+    rng = np.random.default_rng(seed)
+    site = EnumeratedSite(rng)
+    known = site.frontier(100_000.0)
+    budgets = rng.choice(known.amounts[1:], size=min(2, len(known.amounts) - 1), replace=False)
+    for budget in budgets.tolist():
+        best = max((row for row in site.placements() if row[0] <= budget + 1e-6), key=lambda row: row[1])
+        known = known.with_solved(SolvedBudget(budget, best[2], best[0], best[1], best[1], 1.0))
+    bounds = known.bounds()
+    assert (np.diff(bounds) >= 0).all()
+    for price, value, _ in site.placements():
+        if price <= 100_000.0:
+            assert value <= bounds[np.searchsorted(known.amounts, price + 1e-6) - 1] + 1e-12

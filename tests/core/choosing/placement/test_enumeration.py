@@ -15,16 +15,16 @@ def check(faults_of, seeds):
     assert sum(UNPROVEN in faults for faults in found.values()) <= 0.01 * len(seeds)
 
 
-@pytest.mark.parametrize("seeds", parts(60, 300))
+@pytest.mark.parametrize("seeds", parts(20, 300))
 def test_the_best_placement(seeds):
     check(faults_of_solve, seeds)
 
 
-@pytest.mark.parametrize("seeds", parts(30, 150))
+@pytest.mark.parametrize("seeds", parts(10, 150))
 def test_the_cheapest_placement_for_a_share(seeds):
     check(faults_of_cheapest, seeds)
 
 
-@pytest.mark.parametrize("seeds", parts(12, 150))
+@pytest.mark.parametrize("seeds", parts(3, 150))
 def test_the_best_placement_over_scenarios_and_failures(seeds):
     check(faults_of_risk, seeds)

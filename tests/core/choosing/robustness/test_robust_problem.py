@@ -13,7 +13,7 @@ from seip_addon.core.choosing.placement.scenarios import Scenarios
 from seip_addon.core.choosing.placement.search_limits import SolverLimits
 from seip_addon.core.choosing.robustness.robust_problem import RobustProblem
 from seip_addon.core.sensing.lidar.catalogue import load_catalogue
-from seip_addon.core.sensing.scenarios.visibility_under_errors import visibility_under_errors
+from seip_addon.core.sensing.scenarios.scenario_visibility import visibility_under_errors
 from seip_addon.core.sensing.visibility.grid import VisibilitySettings, compute_visibility
 from seip_addon.core.sensing.visibility.surroundings import Surroundings
 from tests.builders.synthetic_junction import junction_site

@@ -14,8 +14,8 @@ from seip_addon.core.choosing.placement.risk import Risk
 from seip_addon.core.choosing.placement.scenarios import Scenarios
 from seip_addon.core.choosing.robustness.robust_problem import RobustProblem
 from seip_addon.core.sensing.lidar.catalogue import load_catalogue
+from seip_addon.core.sensing.scenarios.scenario_visibility import visibility_in_traffic
 from seip_addon.core.sensing.scenarios.traffic_instants import spread_instants
-from seip_addon.core.sensing.scenarios.visibility_in_traffic import visibility_in_traffic
 from seip_addon.core.sensing.traffic.trajectories import RoadUser
 from seip_addon.core.sensing.visibility.grid import compute_visibility
 from seip_addon.core.sensing.visibility.settings import VisibilitySettings

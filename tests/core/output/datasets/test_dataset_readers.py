@@ -2,12 +2,10 @@
 
 What a reader's library does is done by the library where there is one to install: ``.ci/readers`` runs these tests
 with all of them.
-OpenPCDet and mmdetection3d cannot: there the test takes the steps that their documentation and sources
-describe, and says which.
+OpenPCDet cannot: there the test takes the steps that its documentation and sources describe, and says which.
 """
 
 import math
-import pickle
 import warnings
 
 import numpy as np
@@ -63,53 +61,6 @@ def test_openpcdet(frames, tmp_path):
             assert box == pytest.approx(
                 [*frame.labels.centre[user], *frame.labels.size[user], frame.labels.yaw[user]], rel=1e-6, abs=1e-6
             )
-
-
-def read_mmdetection3d(folder, frames):
-    """What Det3DDataset.parse_ann_info and LoadPointsFromFile make of the information file's samples."""
-    information = pickle.loads((folder / "custom_infos_train.pkl").read_bytes())  # noqa: S301  # written by the test
-    assert len(information["data_list"]) == len(frames)
-    return information["metainfo"], information["data_list"]
-
-
-def require_mmdetection3d(folder, samples, frames, classes):
-    for sample, (_, frame) in zip(samples, frames, strict=True):
-        path = folder / "points" / sample["lidar_points"]["lidar_path"].rsplit("/", 1)[-1]
-        points = np.fromfile(path, dtype=np.float32).reshape(-1, sample["lidar_points"]["num_pts_feats"])
-        assert (points == cloud(frame)).all()
-        users = kept(frame)
-        assert len(sample["instances"]) == len(users)
-        for instance, user in zip(sample["instances"], users, strict=True):
-            x, y, bottom, *size, yaw = instance["bbox_3d"]
-            require_around([x, y, bottom + size[2] / 2], size, rotation(yaw), points[frame.instance == user, :3])
-            assert yaw == frame.labels.yaw[user]
-            assert size == frame.labels.size[user].tolist()
-            assert bottom == pytest.approx(frame.labels.centre[user, 2] - frame.labels.size[user, 2] / 2, abs=1e-12)
-            name = next(name for name, number in classes.items() if number == instance["bbox_label_3d"])
-            assert name.lower() == {"bicycle": "cyclist"}.get(frame.labels.category[user], frame.labels.category[user])
-
-
-def test_mmdetection3d_by_its_documented_steps(frames, tmp_path):
-    write("mmdetection3d", frames, make_run(), tmp_path)
-    metainfo, samples = read_mmdetection3d(tmp_path, frames)
-    require_mmdetection3d(tmp_path, samples, frames, metainfo["categories"])
-
-
-def test_mmdetection3d_by_the_base_class_of_its_datasets(frames, tmp_path):
-    pytest.importorskip("torch", reason="mmengine's datasets stand on torch")
-    dataset = reader("mmengine.dataset")
-    write("mmdetection3d", frames, make_run(), tmp_path)
-
-    class Dataset(dataset.BaseDataset):
-        def parse_data_info(self, raw_data_info):
-            return raw_data_info
-
-    found = Dataset(
-        ann_file="custom_infos_train.pkl", data_root=str(tmp_path), data_prefix={"pts": "points"}, test_mode=True
-    )
-    samples = [found.get_data_info(number) for number in range(len(found))]
-    assert found.metainfo["info_version"] == "1.1"
-    require_mmdetection3d(tmp_path, samples, frames, found.metainfo["categories"])
 
 
 def test_kitti_by_open3d_ml(frames, tmp_path):

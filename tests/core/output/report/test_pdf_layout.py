@@ -14,7 +14,6 @@ from seip_addon.core.output.report.blocks import (
     Facts,
     Paragraph,
     Picture,
-    Pictures,
     Report,
     Section,
     Table,
@@ -67,7 +66,7 @@ def sections(seed):
                         Table(("Number", "Text"), rows),
                         Facts(rows),
                         Picture(png(600, chance.randint(200, 700)), TEXT),
-                        Card("S1", (Pictures((png(64, 48),) * 2, TEXT), Facts(rows))),
+                        Card("S1", (Facts(rows),)),
                     )
                 )
             )

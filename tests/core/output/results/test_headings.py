@@ -1,15 +1,9 @@
 import math
 
-from seip_addon.core.geometry.orientation import clockwise_degrees, degrees
+from seip_addon.core.geometry.orientation import degrees
 
 
 def test_counter_clockwise_from_zero_to_below_a_full_turn():
     assert degrees(-math.pi / 2) == 270.0
     assert degrees(2 * math.pi - 1e-12) == 0.0
     assert degrees(-1e-12) == 0.0
-
-
-def test_clockwise_from_minus_to_below_plus_half_a_turn():
-    assert clockwise_degrees(math.pi / 2) == -90.0
-    assert clockwise_degrees(math.pi) == -180.0
-    assert clockwise_degrees(-math.pi) == -180.0

@@ -265,16 +265,6 @@ def test_light_lost_in_air_shortens_the_range():
     assert clear.in_air(0.01).reach(0.1, 0.9) < 30.0 < clear.reach(0.1, 0.9)
 
 
-@given(law=laws)
-def test_the_drop_off_in_its_place_is_right_at_two_ranges(law):
-    near, far = (law.reach(0.2, share * law.ceiling) for share in (0.9, 0.5))
-    exact = law.chance(np.array([near, far]), np.full(2, 0.2))
-    dropoff = law.as_dropoff()
-    if dropoff.intensity_limit < 1.0:
-        # CARLA's own intensity knows the range alone
-        assert dropoff.chance(np.array([near, far]), np.ones(2)) == pytest.approx(exact, abs=1e-6)
-
-
 @pytest.mark.parametrize(
     ("at_10", "at_80"),
     [(0.0, 9.0), (9.0, 9.0), (9.0, 4.0), (9.0, 9.1), (math.nan, 1.0), (1.0, math.inf), (1e200, 1e250), (1e-9, 1.0)],

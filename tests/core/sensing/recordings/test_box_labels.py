@@ -27,9 +27,8 @@ def read(folder, text, name="a.txt"):
     return read_labels(folder / name)
 
 
-def same(found, boxes, categories, ignored=None):
+def same(found, boxes, categories):
     assert found.category.tolist() == list(categories)
-    assert found.ignored == (ignored or {})
     assert len(found) == len(boxes)
     difference = found.boxes - boxes
     difference[:, 6] = np.angle(np.exp(1j * difference[:, 6]))

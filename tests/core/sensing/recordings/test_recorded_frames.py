@@ -123,7 +123,7 @@ def test_one_sensor_without_a_pose_is_levelled_above_the_ground():
 
 def test_points_in_a_labelled_box_are_returns_from_it(records):
     boxes = np.array([[24.0, 22.0, 4.5, 14.0, 12.0, 10.0, 0.1], [0.0, 0.0, 30.0, 4.0, 2.0, 1.0, 1.0]])
-    labels = BoxLabels(boxes, np.array(["truck", "car"], dtype=np.str_), {})
+    labels = BoxLabels(boxes, np.array(["truck", "car"], dtype=np.str_))
     frame = prepared(records).frame(2, labels)
     offset = frame.points - boxes[0, :3]
     local = offset @ rotation(0.1)

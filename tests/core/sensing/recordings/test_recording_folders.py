@@ -29,7 +29,6 @@ def test_a_folder_of_sweeps_is_one_sensor(tmp_path):
     assert (recording.name, sensor.name, len(sensor)) == ("south", "south", 3)
     assert [path.name for path in sensor.paths] == ["2.bin", "9.bin", "10.bin"]
     assert sensor.times.tolist() == [0.0, 0.2, 0.4]
-    assert sensor.sweep(1).time == 0.2
     assert (sensor.sweep(2).points[:, 0] == make_points(seed=0, count=20)["x"]).all()
 
 

@@ -13,7 +13,7 @@ from seip_addon.core.base.progress import finish
 from seip_addon.core.geometry.orientation import orientation
 from seip_addon.core.sensing.lidar.catalogue import load_catalogue
 from seip_addon.core.sensing.scenarios.pose_errors import PoseErrors, draw_errors, out_of_objects
-from seip_addon.core.sensing.scenarios.visibility_under_errors import visibility_under_errors
+from seip_addon.core.sensing.scenarios.scenario_visibility import visibility_under_errors
 from seip_addon.core.sensing.visibility.settings import VisibilitySettings
 from seip_addon.core.sensing.visibility.surroundings import Surroundings
 from seip_addon.core.sensing.visibility.visibility_model import visibility_model

@@ -11,13 +11,13 @@ from hypothesis import strategies as st
 
 from seip_addon.core.base.errors import SeipError
 from seip_addon.core.base.progress import finish
+from seip_addon.core.sensing.scenarios.scenario_visibility import visibility_in_traffic
 from seip_addon.core.sensing.scenarios.traffic_instants import (
     BATCH_SECONDS,
     NO_TRAFFIC,
     obstacles_of,
     spread_instants,
 )
-from seip_addon.core.sensing.scenarios.visibility_in_traffic import visibility_in_traffic
 from seip_addon.core.sensing.traffic.site_traffic import check_runs
 from seip_addon.core.sensing.traffic.trajectories import WARM_UP, RoadUser
 from seip_addon.core.sensing.visibility.grid import compute_visibility
@@ -96,7 +96,7 @@ def by_full_scan(bodies, engine=ANY, around=AROUND):
     """Every ray at everything in one ray caster."""
     caster = make_ray_caster(np.concatenate([SITE.triangles, bodies.triangles]), engine)
     reflectivity = np.concatenate([SITE.reflectivity, bodies.reflectivity])
-    surfaces = near_surfaces(SITE.triangles, SITE.targets.xyz, around.sight.delta, SITE.reflectivity)
+    surfaces = near_surfaces(caster.triangles, SITE.targets.xyz, around.sight.delta, reflectivity)
     return np.array(
         [
             seen_by_tilted_full_scan(place_of(pose, caster, around, reflectivity), tilt, surfaces)[0]
@@ -142,7 +142,8 @@ def test_instants_are_spread_over_all_runs_and_follow_from_the_seed():
         part = np.floor((one.time[one.run == run] - WARM_UP) / (10.0 - WARM_UP) * 16)
         assert part.tolist() == list(range(16))
     assert len(np.unique(one.batch)) == 2 * max(1, round((10.0 - WARM_UP) / BATCH_SECONDS))
-    assert [len(crowd.hulls) for crowd in one.obstacles()] == [1] * 16 + [2] * 16
+    numbers = [len(crowd.triangles) for crowd in one.obstacles()]
+    assert numbers == numbers[:1] * 16 + [2 * numbers[0]] * 16
 
 
 def test_traffic_that_is_of_no_use_is_refused():

@@ -3,6 +3,8 @@
 import math
 from dataclasses import replace
 
+from headless.studies.benchmark.visibility import pairs_within
+
 import numpy as np
 import pytest
 
@@ -13,7 +15,6 @@ from seip_addon.core.sensing.visibility.grid import compute_visibility, seen_fro
 from seip_addon.core.sensing.visibility.ray_casting import make_ray_caster
 from seip_addon.core.sensing.visibility.settings import VisibilitySettings
 from seip_addon.core.sensing.visibility.sight_lines import sight_lines
-from seip_addon.core.sensing.visibility.target_index import TargetIndex
 from seip_addon.core.sensing.visibility.visibility_model import visibility_model
 from tests.builders.synthetic_junction import junction_site, rectangle
 from tests.engines import ANY, each_engine
@@ -38,7 +39,7 @@ def by_full_scan(caster, model, xyz, orientation, delta=SIGHT.delta):
     distance, triangle = caster.cast(xyz, directions, model.max_range)
     hit = (triangle >= 0) & (distance >= model.min_range)
     seen = np.zeros(len(SITE.targets), dtype=bool)
-    _, targets = TargetIndex(SITE.targets.xyz, delta).pairs_within_delta(xyz + directions[hit] * distance[hit, None])
+    _, targets = pairs_within(xyz + directions[hit] * distance[hit, None], SITE.targets.xyz, delta)
     seen[targets] = True
     return seen
 

@@ -8,10 +8,9 @@ from hypothesis import strategies as st
 from PIL import Image
 
 from seip_addon.core.base.errors import SeipError
-from seip_addon.core.base.progress import finish
 from seip_addon.core.geometry.geo_reference import GeoReference
 from seip_addon.core.geometry.height_raster import HeightRaster
-from seip_addon.core.world.elevation.at_place import MapSurroundings, TerrainRequest, with_terrain
+from seip_addon.core.world.elevation.at_place import MapSurroundings, with_terrain
 from seip_addon.core.world.elevation.geotiff import read_geotiff
 from seip_addon.core.world.streetscape.description import SiteDescription
 from tests.builders.dem_files import KEYS, SCALE, TIE_POINT, origin_at, sampled, write_dem
@@ -29,8 +28,7 @@ def plane(x, y):
 
 def relief(path, reference=MAP, lanes=FLAT, area=AREA):
     around = MapSurroundings(reference, area, lanes)
-    site, _ = finish(with_terrain(SiteDescription(), TerrainRequest(path), around))
-    return site.relief
+    return with_terrain(SiteDescription(), path, around)[0].relief
 
 
 @pytest.mark.parametrize("point", [False, True])
@@ -102,6 +100,23 @@ def test_a_model_of_another_place_is_refused_with_both_places(tmp_path):
     path = write_dem(tmp_path / "dem.tif", sampled(plane, X + 9850, Y + 150, 300), X + 9850, Y + 150)
     with pytest.raises(SeipError, match=r"0% of the place: its middle is at latitude 52\.5\d*, longitude 13\.5"):
         relief(path)
+
+
+@pytest.mark.parametrize(("epsg", "reference", "complaint"), [
+    (28992, MAP, r"dem\.tif is in EPSG:28992: .* gdalwarp -t_srs EPSG:32633 "),
+    (25833, GeoReference("EPSG:31468"), "projection of the scene's map, 'EPSG:31468', is not supported"),
+    (25833, GeoReference(UTM33, (X, Y, 0.0, 0.1)), "turns its coordinates"),
+])  # fmt: skip
+def test_a_system_that_cannot_be_converted_is_refused_with_the_cure(tmp_path, epsg, reference, complaint):
+    path = write_dem(tmp_path / "dem.tif", sampled(plane, X - 150, Y + 150, 300), X - 150, Y + 150, epsg=epsg)
+    with pytest.raises(SeipError, match=complaint):
+        relief(path, reference)
+
+
+def test_a_map_with_heights_keeps_them(tmp_path):
+    path = write_dem(tmp_path / "dem.tif", sampled(plane, X - 150, Y + 150, 300), X - 150, Y + 150)
+    with pytest.raises(SeipError, match=r"own heights there \(0\.0 to 9\.0 m\)"):
+        relief(path, lanes=np.linspace([0, 0, 0], [50, 0, 9], 10))
 
 
 ONES = np.ones((4, 4), np.float32)

@@ -6,7 +6,6 @@ import pytest
 from seip_addon.core.base.progress import finish
 from seip_addon.core.site.roles import Role
 from seip_addon.core.workflows.site_building import SiteRequest, build_site
-from seip_addon.core.world.elevation.at_place import TerrainRequest
 from seip_addon.core.world.openstreetmap.network_map import read_network_map
 from tests.builders.dem_files import origin_at, sampled, write_dem
 from tests.builders.opendrive_text import document, geometry, lane, road, section
@@ -59,7 +58,7 @@ def test_everything_stands_on_a_plane(tmp_path, z):
         "[[street_light]]\nposition = [20, -12]\n[[tree]]\nposition = [-20, 15]\n",
         encoding="utf-8",
     )
-    asked = SiteRequest(near=(0.0, 0.0), radius=60.0, site=description, terrain=TerrainRequest(ground(tmp_path, plane)))
+    asked = SiteRequest(near=(0.0, 0.0), radius=60.0, site=description, terrain=ground(tmp_path, plane))
     model = finish(build_site(street(tmp_path, z), asked)).model
     assert model.origin[2] == 40
     assert np.abs(over(named(model, "Driving lanes"), model, plane)).max() < 1e-3
@@ -75,7 +74,7 @@ def test_everything_stands_on_a_plane(tmp_path, z):
 
 def test_roads_follow_hills_within_the_smoothing(tmp_path):
     """A Gaussian of 4 m takes (1 - exp(-(4/40)²/2)) of a wave of 251 m, chords of ten metres take as much again."""
-    asked = SiteRequest(near=(0.0, 0.0), radius=60.0, terrain=TerrainRequest(ground(tmp_path, hill)))
+    asked = SiteRequest(near=(0.0, 0.0), radius=60.0, terrain=ground(tmp_path, hill))
     model = finish(build_site(street(tmp_path), asked)).model
     assert np.abs(over(named(model, "Driving lanes"), model, hill)).max() < 6 * 0.005 * 3
     assert np.abs(over(named(model, "Verge"), model, hill)).max() < 0.25
@@ -86,7 +85,7 @@ def test_roads_follow_hills_within_the_smoothing(tmp_path):
 
 @needs_sumo
 def test_streets_of_an_extract_lie_on_the_ground(tmp_path):
-    asked = SiteRequest(near_latlon=(52.5, 13.4), terrain=TerrainRequest(ground(tmp_path, plane)))
+    asked = SiteRequest(near_latlon=(52.5, 13.4), terrain=ground(tmp_path, plane))
     built = finish(build_site(crossing().write(tmp_path / "place.osm"), asked))
     roads = named(built.model, "Driving lanes").solid.vertices
     slope = np.linalg.lstsq(np.column_stack([roads[:, :2], np.ones(len(roads))]), roads[:, 2], rcond=None)[0]
@@ -108,7 +107,7 @@ def test_streets_of_an_extract_lie_on_the_ground(tmp_path):
 
 @needs_sumo
 def test_a_bridge_stays_above(tmp_path):
-    asked = SiteRequest(near_latlon=(52.5, 13.4), approaches=80.0, terrain=TerrainRequest(ground(tmp_path, plane)))
+    asked = SiteRequest(near_latlon=(52.5, 13.4), approaches=80.0, terrain=ground(tmp_path, plane))
     model = finish(build_site(bridge_above().write(tmp_path / "place.osm"), asked)).model
     deck = over_extract(named(model, "Roads above"), model)
     assert deck.max() == pytest.approx(6.0, abs=0.6)

@@ -2,7 +2,7 @@
 
 import functools
 import os
-from collections import defaultdict
+from collections import Counter, defaultdict
 from pathlib import Path
 
 import numpy as np
@@ -78,3 +78,23 @@ def test_another_reader_finds_the_same_areas(name):
     ours = areas((surface.lane_type, surface.polygon) for surface in map_lanes(read_map(path)))
     for kind in ("driving", "sidewalk", "shoulder"):
         assert ours[kind] == pytest.approx(theirs[kind], rel=1e-3), kind
+
+
+def test_the_figures_of_town05():
+    road_map, surfaces = loaded("Town05")
+    assert len(road_map.roads) == 259
+    assert sum(road.junction_id is not None for road in road_map.roads) == 206
+    assert len(road_map.junctions) == 21
+    assert sum(road.length for road in road_map.roads) == pytest.approx(8.0e3, rel=5e-3)
+    records = Counter(
+        lane.type for road in road_map.roads for section in road.sections for lane in (*section.left, *section.right)
+    )
+    assert {kind: records[kind] for kind in ("driving", "sidewalk", "shoulder", "parking")} == {
+        "driving": 1658,
+        "sidewalk": 117,
+        "shoulder": 200,
+        "parking": 18,
+    }
+    found = areas((surface.lane_type, surface.polygon) for surface in surfaces)
+    assert found["driving"] == pytest.approx((82_184, 71_979), rel=5e-3)
+    assert found["sidewalk"][1] == pytest.approx(26_443, rel=5e-3)

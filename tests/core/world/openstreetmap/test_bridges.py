@@ -11,7 +11,6 @@ from seip_addon.core.base.progress import finish
 from seip_addon.core.geometry.plan import surface_height
 from seip_addon.core.site.scene_geometry import OTHER_LEVELS
 from seip_addon.core.workflows.site_building import SiteRequest, build_site
-from seip_addon.core.world.elevation.at_place import TerrainRequest
 from seip_addon.core.world.openstreetmap.network_map import read_network_map
 from tests.builders.dem_files import origin_at, sampled, write_dem
 from tests.builders.osm_text import Extract
@@ -176,7 +175,7 @@ def test_on_terrain_a_bridge_leads_from_bank_to_bank(tmp_path):
     trunk(extract)
     heights = sampled(embankment, X - 420, Y + 420, 840)
     dem = write_dem(tmp_path / "dem.tif", heights, X - 420, Y + 420)
-    site, streets = built(extract, tmp_path, level=("High Road",), terrain=TerrainRequest(dem))
+    site, streets = built(extract, tmp_path, level=("High Road",), terrain=dem)
     deck = [lane for lane in lanes_of(streets, "High Road") if abs(lane.left[:, 0].mean() - 300) < 20]
     assert min(lane.left[:, 2].min() for lane in deck) > 45.0
     assert max(lane.left[:, 2].max() for lane in lanes_of(streets)) < 47.0
