@@ -9,7 +9,6 @@ from headless import verify
 import bpy
 import numpy as np
 import pytest
-from tests.builders.site_recording import changed, save_site_recording
 
 from seip_addon.core.base.errors import SeipError
 from seip_addon.core.output.results.verification_record import load_verification
@@ -19,6 +18,7 @@ from seip_addon.scene import contract
 from seip_addon.scene.blend_file import open_blend, save_blend
 from seip_addon.scene.read import read_scene
 from seip_addon.scene.sensors import read_sensors
+from tests.builders.site_recording import changed, save_site_recording
 from tests.builders.small_junction import box_triangles
 from tests.builders.small_scene import make_run
 
@@ -76,8 +76,8 @@ def test_poses_changes_units_and_the_corrected_scene(plan, tmp_path, capsys):
     kinds = {(change.kind, change.name) for change in record.changes if change.kind != "vehicle"}
     assert kinds == {("new", "Found 1"), ("gone", GONE)}
     told = capsys.readouterr().out
-    assert re.search(rf"S1: {np.linalg.norm(SHIFT):.2f} m and 0\.\d° from its plan", told)
-    assert f"coverage: {record.coverage.promised:.1%} promised" in told
+    assert re.search(rf"S1 is {np.linalg.norm(SHIFT):.2f} m from its planned position: 0\.3\d m east", told)
+    assert f"{record.coverage.promised:.1%} were promised" in told
     assert {"os0_32_s1", "os0_32_s2"} < set(load_catalogue((folder / "units.toml",)))
     assert names(folder / "verified.blend") == names(plan / "plan.blend") - {GONE} | {"Found 1"}
     open_blend(folder / "verified.blend")
@@ -91,7 +91,7 @@ def test_a_corrected_scene_is_verified_again_without_changes(plan, tmp_path, cap
     capsys.readouterr()
     verify.main([str(tmp_path / "one" / "verified.blend"), str(plan / "july"), "-o", str(tmp_path / "two")])
     told = capsys.readouterr().out
-    assert " is new" not in told
+    assert "not in the plan" not in told
     assert "no longer there" not in told
     assert names(tmp_path / "two" / "verified.blend") == names(tmp_path / "one" / "verified.blend")
 

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 from typing import Literal
 
-from ...base.counts import counted
 from ...sensing.recordings.verification import CoverageSteps, InstalledSensor
 from ...site.locations import direction
 from ...storage.files import read_small
@@ -23,7 +22,6 @@ Box = tuple[float, float, float, float, float, float, float]
 LEAST_COST = 0.0005
 """Share of coverage that is shown as 0.1 points."""
 _LEAST_SHIFT, _LEAST_ANGLE = 0.005, 0.05  # metres and degrees that are shown as 0.01 m and 0.1 degrees
-_NAMED = 3  # changes that are named in a sentence
 
 
 @dataclass(frozen=True)
@@ -146,25 +144,6 @@ def coverage_text(steps: CoverageSteps) -> str:
         f"The installation sees {steps.installed:.1%} of the road; {steps.promised:.1%} were promised. "
         f"In percentage points: {', '.join(parts)}."
     )
-
-
-def summary(record: VerificationRecord) -> tuple[str, ...]:
-    """Return the sentences for a panel: how far each sensor is off, what has changed, and the coverage."""
-    shifts = [(one.id, math.hypot(*one.shift_m), math.hypot(*one.rotation_deg)) for one in record.sensors]
-    off = ", ".join(f"{name} by {shift:.2f} m and {turn:.1f}°" for name, shift, turn in shifts)
-    changes = "; ".join(_named(objects(record))) or "Nothing has changed that the sensors see"
-    return f"Off the plan: {off}.", f"{changes}.", coverage_text(record.coverage)
-
-
-def _named(changes: Sequence[RecordedChange]) -> Iterator[str]:
-    for kind, one, several in (
-        ("new", "object is not in the scene", "objects are not in the scene"),
-        ("gone", "object is no longer there", "objects are no longer there"),
-    ):
-        names = [change.name for change in changes if change.kind == kind]
-        if names:
-            more = f" and {len(names) - _NAMED} more" if len(names) > _NAMED else ""
-            yield f"{counted(len(names), one, several)} ({', '.join(names[:_NAMED])}{more})"
 
 
 def _listed(parts: Sequence[str]) -> str:

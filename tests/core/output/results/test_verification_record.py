@@ -2,7 +2,6 @@
 
 import json
 import math
-from dataclasses import replace
 
 import pytest
 
@@ -14,7 +13,6 @@ from seip_addon.core.output.results.verification_record import (
     coverage_text,
     load_verification,
     pose_text,
-    summary,
 )
 from seip_addon.core.storage.json_dataclass import as_json
 from tests.builders.verification_folder import CHANGES, STEPS, make_pose
@@ -66,11 +64,3 @@ def test_effects_add_up_to_the_difference():
         "The installation sees 51.0% of the road; 62.0% were promised. In percentage points: poses of the sensors "
         "−2.0, changed objects +0.5, gain −9.5."
     )
-
-
-def test_the_summary_has_three_sentences_without_vehicles():
-    poses, changes, coverage = summary(RECORD)
-    assert poses == "Off the plan: S1 by 0.36 m and 2.5°, S2 by 0.36 m and 2.5°."
-    assert changes == ("2 objects are not in the scene (Found 1, Found 3); 1 object is no longer there (Kiosk <b>).")
-    assert coverage == coverage_text(STEPS)
-    assert summary(replace(RECORD, changes=CHANGES[3:]))[1] == "Nothing has changed that the sensors see."
