@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ...base.arrays import Boolean, Integer
 from ...base.progress import Progress, each_in_threads
 from ...geometry.orientation import orientations
-from ..visibility.ray_casting import engine_name, make_ray_caster
+from ..visibility.ray_casting import engine_name, make_ray_caster, threads_of
 from ..visibility.surroundings import Surroundings
 from ..visibility.visibility_model import VisibilityModel
 from .pose_errors import PoseErrors, draw_errors, out_of_objects
@@ -122,6 +122,5 @@ def visibility_in_traffic(
             seen = model.see(lidar, candidates.xyz[pose], candidates.orientation(pose))
             packed[instant, number] = np.packbits(seen)
 
-    threads = make_ray_caster(site.triangles, engine).threads
-    yield from each_in_threads(compute, range(len(instants)), threads, "computing visibility in traffic")
+    yield from each_in_threads(compute, range(len(instants)), threads_of(engine), "computing visibility in traffic")
     return ScenarioVisibility(packed, len(site.targets))

@@ -81,6 +81,11 @@ def engine_name(engine: Engine) -> Engine:
     return engine
 
 
+def threads_of(engine: Engine) -> int:
+    """Return the number of threads in which casters of an engine may cast at once."""
+    return EmbreeRayCaster.threads if engine_name(engine) == "embree" else BvhRayCaster.threads
+
+
 def make_ray_caster(triangles: Float, engine: Engine = "auto") -> RayCaster:
     """Build a ray caster; see `engine_name` for ``auto``.
 

@@ -108,7 +108,10 @@ def read_geotiff(path: Path) -> GeoTiff:
     except Image.DecompressionBombError as error:
         raise _too_large(name) from error
     except UnidentifiedImageError as error:
-        raise SeipError(f"{name} is not a TIFF file: export it as GeoTIFF (gdal_translate in dem.tif)") from error
+        raise SeipError(
+            f"{name} is not a TIFF file: convert it to GeoTIFF (gdal_translate in dem.tif; for LAS and LAZ with "
+            "pdal, see docs/sources.md)"
+        ) from error
     except _BROKEN as error:
         raise SeipError(f"{name} is a TIFF that cannot be read ({str(error)[:80]}); {_CONVERT}") from error
     if bands != 1 or values.ndim != 2 or min(values.shape) < 2:

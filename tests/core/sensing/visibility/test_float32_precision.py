@@ -12,11 +12,7 @@ from seip_addon.core.sensing.lidar.model import LidarModel
 from seip_addon.core.sensing.visibility.grid import compute_visibility
 from seip_addon.core.sensing.visibility.ray_casting import make_ray_caster
 from seip_addon.core.sensing.visibility.settings import MAX_DELTA, Engine, VisibilitySettings
-from seip_addon.core.site.candidates import CandidateSettings
-from seip_addon.core.site.scene_geometry import Mesh, Pole, SceneGeometry
 from seip_addon.core.site.site import Candidates, Site, Targets
-from seip_addon.core.workflows.survey import grid_key, lay_out
-from seip_addon.core.workflows.survey_settings import SurveySettings
 from tests.engines import each_engine
 from tests.oracles.float64_bounds import FirstHits, first_hits
 from tests.oracles.float64_rays import first_hits as plain_first_hits
@@ -164,32 +160,3 @@ def test_float32_moves_hits_where_coordinates_are_large(engine: Engine) -> None:
     for distance, off in ((near, False), (far, True)):
         scene = with_stray(STREET, distance)
         assert (largest_error(scene, truth(scene)) > 1e-3) == off
-
-
-def geometry(triangles: np.ndarray, *strays: Mesh) -> SceneGeometry:
-    road = Mesh("carriageway", triangles)
-    region = shapely.box(*triangles.min(axis=(0, 1))[:2], *triangles.max(axis=(0, 1))[:2])
-    pole = Pole("pole", np.array([0.0, 6.0, 0.0]))
-    return SceneGeometry("street", np.zeros(3), (road,), (), strays, region, poles=(pole,))
-
-
-GROUND = np.array([[[-20.0, -4, 0], [20, -4, 0], [20, 4, 0]], [[-20, -4, 0], [20, 4, 0], [-20, 4, 0]]])
-
-
-def moved(x: float, y: float) -> np.ndarray:
-    return GROUND + np.array([x, y, 0.0])
-
-
-SHORT = SurveySettings(candidates=CandidateSettings(sensors=("type3",), heights=(5.4,), setback=0.5))
-
-
-def test_what_was_forgotten_far_away_changes_nothing_and_is_named() -> None:
-    plain = lay_out(geometry(GROUND), SHORT)
-    stray = lay_out(geometry(GROUND, Mesh("left behind", moved(5e5, 0)), Mesh("another", moved(0, 400))), SHORT)
-    np.testing.assert_array_equal(stray.site.triangles, plain.site.triangles)
-    assert grid_key(stray) == grid_key(plain)
-    (warning,) = set(stray.warnings) - set(plain.warnings)
-    assert "4 triangles of 2 objects lie beyond every sensor's range of 301 m" in warning
-    assert "'left behind'" in warning
-    assert "499,9" in warning
-    assert "wide" not in warning
