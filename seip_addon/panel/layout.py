@@ -44,7 +44,7 @@ BETWEEN = " · "
 ICONS = {"changed": "ERROR", "working": "TIME"}
 """Icons of the parts that every header has room for: they take the place of the words where these have none."""
 _SITE = ("choose_map", "download_map", "build_site")
-_SIMULATION, _SCAN, _DATASET = ("simulate_traffic", "install_sumo"), ("scan_frame",), ("write_dataset",)
+_SIMULATION, _SCAN = ("simulate_traffic", "install_sumo"), ("scan_frame",)
 _DETECTION = ("detect",)
 WORK: Mapping[str, tuple[str, ...]] = {
     "site": (*_SITE, "load_example", "check_site", "install_sumo"),
@@ -52,10 +52,9 @@ WORK: Mapping[str, tuple[str, ...]] = {
     "placement": ("solve_placement", "judge_placement", "compare_scene", "evaluate_sensors"),
     "results": ("follow_sensors", "show_sight_lines"),
     "view": ("show_sight_lines",),
-    "traffic": ("load_traffic", *_SIMULATION, *_SCAN, *_DATASET, *_DETECTION),
+    "traffic": ("load_traffic", *_SIMULATION, *_SCAN, *_DETECTION),
     "simulation": _SIMULATION,
     "scan": _SCAN,
-    "dataset": _DATASET,
     "detection": _DETECTION,
     "export": ("write_report", "export_result"),
 }

@@ -1,9 +1,9 @@
-"""Roles of objects in the placement, weights of regions and rules of poles."""
+"""Roles of objects in the placement, and weights of regions."""
 
 from __future__ import annotations
 
 import bpy
-from bpy.props import EnumProperty, FloatProperty
+from bpy.props import FloatProperty
 
 from ..core.site.roles import Role
 from ..core.site.scene_geometry import DEFAULT_WEIGHT
@@ -14,7 +14,6 @@ from .properties import as_typed
 from .work import Conditional, Obstacles, ShortWork, select_alone
 
 ROLE_ITEMS = tuple((role.name, role.value.capitalize(), f"{roles.WORDS[role].capitalize()}") for role in roles.ROLES)
-_POLE_RULES = ("", contract.MANDATORY, contract.FORBIDDEN)
 AREA_ITEMS = tuple(item for item in ROLE_ITEMS if Role[item[0]] in roles.AREAS)
 
 
@@ -26,18 +25,6 @@ def _region_weight(obj: bpy.types.Object) -> float:
 
 def _set_region_weight(obj: bpy.types.Object, value: float) -> None:
     obj[contract.WEIGHT] = as_typed(value)
-
-
-def _pole_rule(obj: bpy.types.Object) -> int:
-    return next((number for number, mark in enumerate(_POLE_RULES) if mark and obj.get(mark)), 0)
-
-
-def _set_pole_rule(obj: bpy.types.Object, value: int) -> None:
-    for number, mark in enumerate(_POLE_RULES[1:], start=1):
-        if number == value:
-            obj[mark] = True
-        elif mark in obj:
-            del obj[mark]
 
 
 PROPERTIES = (
@@ -54,24 +41,8 @@ PROPERTIES = (
             options=set(),
         ),
     ),
-    (
-        bpy.types.Object,
-        "seip_pole_rule",
-        EnumProperty(
-            name="Rule",
-            description=f"Rule for a sensor on this pole ({contract.FORBIDDEN}, {contract.MANDATORY})",
-            items=(
-                ("FREE", "Free", "A sensor is allowed"),
-                ("MANDATORY", "Sensor", "A sensor is required"),
-                ("FORBIDDEN", "No Sensor", "No sensor is allowed"),
-            ),
-            get=_pole_rule,
-            set=_set_pole_rule,
-            options=set(),
-        ),
-    ),
 )
-"""Properties of objects that edit custom properties of the contract."""
+"""Property of objects that edits a custom property of the contract."""
 
 
 class WritesScene(Conditional):
@@ -165,5 +136,3 @@ def _draw_object(layout: bpy.types.UILayout, scene: bpy.types.Scene, obj: bpy.ty
     column.enabled = obj.is_editable
     if Role.WEIGHTED_REGIONS in assigned:
         column.prop(obj, "seip_region_weight")
-    if Role.POLES in assigned:
-        column.prop(obj, "seip_pole_rule")

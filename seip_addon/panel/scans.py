@@ -1,10 +1,9 @@
-"""Scans of traffic: the point cloud of a frame, and datasets of whole runs."""
+"""Scans of traffic: the point cloud of a frame."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Generator, Sequence
-from pathlib import Path
 
 import bpy
 import numpy as np
@@ -15,19 +14,18 @@ from ..core.output.pictures.colours import By, cloud_colours, sensor_colour, str
 from ..core.output.pictures.palette import MAX_INTENSITY, STATIC_COLOUR, rgb
 from ..core.output.results.versions import versions
 from ..core.sensing.scans.frame import Frame
-from ..core.sensing.scans.run_folder import Record, Run, check_run_folder
+from ..core.sensing.scans.run_folder import Run
 from ..core.sensing.scans.sensor import MountedSensor
 from ..core.sensing.traffic.source import load_traffic
-from ..core.workflows.recording import RecordingSettings, frame_number, make_run, record, simulation_of
+from ..core.workflows.recording import RecordingSettings, frame_number, make_run, simulation_of
 from ..scene import contract
 from ..scene.read import read_scene
 from ..scene.sensors import read_sensors
 from ..scene.traffic import read_traffic
 from . import overlays, preferences
-from .layout import draw_path, draw_reason, draw_run, draw_sentence, draw_settings
+from .layout import draw_reason, draw_run, draw_sentence, draw_settings
 from .legend import Block, Colour, Entry
 from .overlays import Layer, Overlay
-from .properties import saved_path
 from .scene_status import no_sensors
 from .session import LastScan, session
 from .work import Job, LongWork
@@ -121,33 +119,9 @@ def _scanned(
     return LastScan(run, simulation, frame, time.perf_counter() - began)
 
 
-class SEIP_OT_write_dataset(LongWork, bpy.types.Operator):
-    """Scan all frames and write them with the boxes of all road users, as datasets for training detectors"""
-
-    obstacles = (why_no_scan,)
-    bl_options = {"REGISTER"}  # as above
-    stopped_message = "stopped; what is written stays, and the same run goes on from there"
-
-    def job(self, scene: bpy.types.Scene) -> Job:
-        """Record the scene as it is, and say what was written."""
-        folder = saved_path(scene.seip.traffic.folder, "the scans")
-        scene, (written, warnings) = yield _recorded(_run_of(scene), scene.seip.traffic.recording(), folder)
-        self.warn(warnings)
-        self.report({"INFO"}, f"{counted(len(written['frames']), 'frame')} in {folder}")
-
-
-def _recorded(
-    reading: Generator[Progress, None, Run], settings: RecordingSettings, folder: Path
-) -> Generator[Progress, None, tuple[Record, tuple[str, ...]]]:
-    run = yield from reading
-    check_run_folder(folder, run)
-    simulation = yield from simulation_of(run)
-    return (yield from record(folder, run, simulation, settings)), tuple(simulation.warnings)
-
-
 def _run_of(scene: bpy.types.Scene) -> Generator[Progress, None, Run]:
     """Return a job that gathers all that scans follow from, as the scene is now; it reads the traffic of files."""
-    settings: RecordingSettings = scene.seip.traffic.recording()
+    settings = RecordingSettings(scene.seip.traffic.scan())
     geometry, sensors = read_scene(scene).geometry, read_sensors(scene, preferences.catalogue())
     files = scene.seip.traffic.files()
     animated = finish(read_traffic(scene)) if files is None else None
@@ -172,16 +146,3 @@ def draw_scan(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     if overlays.find(context.scene, NAME) is not None:
         layout.row(align=True).prop(context.scene.seip.view, "cloud_colour", expand=True)
         layout.operator("seip.hide_overlay", icon="X").name = NAME
-
-
-def draw_dataset(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
-    """Draw what is written where."""
-    traffic = context.scene.seip.traffic
-    if draw_reason(layout, why_no_scan(context.scene)):
-        return
-    draw_path(layout, traffic, "folder")
-    part = () if traffic.whole else ("start", "duration")
-    draw_settings(layout, traffic, "whole", *part, "rate", "split")
-    layout.label(text="Formats")
-    layout.column(align=True).prop(traffic, "formats")
-    draw_run(layout, "seip.write_dataset")

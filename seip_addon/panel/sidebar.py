@@ -29,7 +29,7 @@ STEPS: tuple[tuple[str, ...], ...] = (
     ("add_catalogue", "preview_beams", "solve_placement"),
     ("evaluate_sensors", "export_result"),
     ("colour_coverage",),
-    ("load_traffic", "simulate_traffic", "scan_frame", "write_dataset", "detect"),
+    ("load_traffic", "simulate_traffic", "scan_frame", "detect"),
     ("stop",),
 )
 """Operators of the menu, by step of the work."""
@@ -63,7 +63,6 @@ class SEIP_PG_sections(bpy.types.PropertyGroup):
     traffic: _section("Traffic and Detection")
     simulation: _section("Traffic Simulation")
     scan: _section("Scan")
-    dataset: _section("Dataset")
     detection: _section("Detection")
     export: _section("Export")
 
@@ -119,7 +118,6 @@ def draw_traffic(layout: bpy.types.UILayout, context: bpy.types.Context) -> None
     parts = {
         "simulation": traffic.draw_simulation,
         "scan": scans.draw_scan,
-        "dataset": scans.draw_dataset,
         "detection": detection.draw,
     }
     draw_sections(layout, parts, context, _traffic(context.scene))

@@ -8,18 +8,15 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 import bpy
-from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
+from bpy.props import BoolProperty, IntProperty, StringProperty
 
 from ..core.base.counts import counted
 from ..core.base.errors import SeipError
 from ..core.base.progress import Progress
-from ..core.output.datasets.formats import FORMATS
-from ..core.output.datasets.sample import SPLITS
 from ..core.programs.sumo_programs import NETWORK_SUFFIX
 from ..core.sensing.scans.simulation import ScanSettings
 from ..core.sensing.traffic.source import TrafficFiles, describe_categories, load_traffic
 from ..core.sensing.traffic.trajectories import Trajectories
-from ..core.workflows.recording import RecordingSettings
 from ..core.workflows.traffic_simulation import DEFAULT_RUNS, SimulatedRuns, SimulationSettings, simulate_runs
 from ..core.world.openstreetmap.site import is_extract
 from ..core.world.traffic_simulation.demand import Demand
@@ -37,11 +34,6 @@ EXAMPLES = Path(__file__).resolve().parents[2] / "scenes"
 """Folder of the example: beside the package, in a checkout as in the extension."""
 EXAMPLE_RUN, EXAMPLE_MAP = EXAMPLES / "junction_traffic" / "run-1.npz", EXAMPLES / "junction.xodr"
 EXAMPLE_SITE = EXAMPLES / "junction.toml"
-FORMAT_ITEMS = tuple(
-    (key, FORMATS[key].name, f"Write the dataset as {FORMATS[key].name}", "NONE", number)
-    for key, number in (("openpcdet", 1), ("kitti", 4), ("pcd", 8))
-)
-"""Formats of datasets with the numbers by which a .blend stores them; 2 was that of a format that is gone."""
 NO_FILE = "There is no traffic file: name one, or animate objects of your own in SEIP Traffic."
 _MOST_SECONDS = 3600.0
 NO_MAP = "There is no map to simulate traffic on: name the OpenDRIVE map (.xodr) that this site was built from."
@@ -71,48 +63,6 @@ class SEIP_PG_traffic(bpy.types.PropertyGroup):
         name="Noise", description="Noisy ranges and lost returns, as in the sensors' data sheets", default=True
     )
     rolling_shutter: of_setting(ScanSettings, "rolling_shutter", "Rolling Shutter")
-    whole: BoolProperty(name="Whole Run", description="Scan the whole run", default=True)
-    start: FloatProperty(
-        name="Start",
-        description="Time of the first frame, in seconds",
-        subtype="TIME_ABSOLUTE",
-        unit="TIME_ABSOLUTE",
-        min=0.0,
-    )
-    duration: FloatProperty(
-        name="Duration",
-        description="Time from the first to the last frame, in seconds",
-        subtype="TIME_ABSOLUTE",
-        unit="TIME_ABSOLUTE",
-        default=10.0,
-        min=0.0,
-    )
-    rate: FloatProperty(
-        name="Rate (Hz)",
-        description="Frames per second; 0 for the rotation rate of the slowest sensor",
-        default=0.0,
-        min=0.0,
-        soft_max=20.0,
-        step=100,
-    )
-    folder: path_property(
-        "Folder",
-        "Output folder for frames and datasets; an interrupted run resumes there",
-        folder=True,
-        default="//scans",
-    )
-    formats: EnumProperty(
-        name="Formats",
-        description="Datasets to write beside the frames",
-        items=FORMAT_ITEMS,
-        options={"ENUM_FLAG"},
-        default={"openpcdet"},
-    )
-    split: EnumProperty(
-        name="Split",
-        description="Split of the dataset for the whole run",
-        items=tuple((split, split.capitalize(), f"The run belongs to the split {split!r}") for split in SPLITS),
-    )
 
     def files(self) -> TrafficFiles | None:
         """Return the files that traffic is read from, None where it is animated in the scene."""
@@ -123,16 +73,9 @@ class SEIP_PG_traffic(bpy.types.PropertyGroup):
         routes = (absolute(self.routes),) if self.routes else ()
         return TrafficFiles(absolute(self.file), routes, absolute(self.net) if self.net else None)
 
-    def recording(self) -> RecordingSettings:
+    def scan(self) -> ScanSettings:
         """Return the settings of scans as the core takes them."""
-        return RecordingSettings(
-            scan=ScanSettings(self.seed, self.noise, self.rolling_shutter),
-            start=None if self.whole else as_typed(self.start),
-            duration=None if self.whole else as_typed(self.duration),
-            rate=as_typed(self.rate) or None,
-            formats=tuple(key for key in FORMATS if key in self.formats),
-            split=self.split,
-        )
+        return ScanSettings(self.seed, self.noise, self.rolling_shutter)
 
 
 def why_no_load(scene: bpy.types.Scene) -> str:

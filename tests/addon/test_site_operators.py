@@ -134,21 +134,13 @@ def test_roles_by_operator(scene):
         bpy.ops.seip.assign_role(role="ROADS")
 
 
-def test_weights_and_rules_are_the_contract_s_own(scene):
+def test_the_weight_of_a_region_is_the_contract_s_own(scene):
     bpy.ops.mesh.primitive_plane_add()
     obj = bpy.context.object
     assert obj.seip_region_weight == 2.0
-    assert obj.seip_pole_rule == "FREE"
     assert not obj.keys()
     obj.seip_region_weight = 3.3
     assert obj[contract.WEIGHT] == 3.3
-    obj.seip_pole_rule = "MANDATORY"
-    assert obj[contract.MANDATORY]
-    obj.seip_pole_rule = "FORBIDDEN"
-    assert obj[contract.FORBIDDEN]
-    assert contract.MANDATORY not in obj
-    obj.seip_pole_rule = "FREE"
-    assert list(obj.keys()) == [contract.WEIGHT]
     obj[contract.WEIGHT] = "heavy"
     assert obj.seip_region_weight == 2.0
 
