@@ -70,10 +70,8 @@ def _detach(part: ModuleType) -> None:
 def _lists(part: ModuleType) -> Iterator[tuple[Any, Callable[..., None]]]:
     """Yield Blender's lists of handlers, and its menus, with the functions that a module has for them."""
     for event, function in getattr(part, "HANDLERS", ()):
-        yield (
-            getattr(bpy.app.handlers, event),
-            bpy.app.handlers.persistent(function),
-        )  # also after another file is opened
+        # persistent: also after another file is opened
+        yield getattr(bpy.app.handlers, event), bpy.app.handlers.persistent(function)
     yield from ((getattr(bpy.types, menu), function) for menu, function in getattr(part, "MENUS", ()))
 
 

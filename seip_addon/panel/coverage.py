@@ -80,7 +80,7 @@ def legend_of_coverage(scene: bpy.types.Scene) -> Block | None:
     if legend is None:
         return None
     rows = zip(legend.words, legend.colours, legend.shares, strict=True)
-    entries = tuple(Entry(f"{words}  {share:.1%}", ((*rgb(colour), 1.0),)) for words, colour, share in rows)
+    entries = tuple(Entry(f"{words}  {share:.1%}", (rgb(colour),)) for words, colour, share in rows)
     return Block(legend.title, (*entries, *_areas(scene)))
 
 
@@ -91,7 +91,7 @@ def _areas(scene: bpy.types.Scene) -> Iterator[Entry]:
         collection = contract.find(scene, name)
         objects = () if collection is None else collection.all_objects
         if any(obj.visible_get(view_layer=layer) for obj in objects if obj.name in layer.objects):
-            yield Entry(words, ((*rgb(colour), 1.0),))
+            yield Entry(words, (rgb(colour),))
 
 
 def shows_coverage(space: bpy.types.SpaceView3D) -> bool:
@@ -203,9 +203,9 @@ def sight_overlay(sight: SightLines, label: str) -> Overlay:
     block = Block(
         f"{label}: {sight.in_range:,} targets in its range",
         (
-            Entry(f"{sight.seen:,} seen{drawn}", (_opaque(LINES),)),
-            Entry(f"{len(sight.hidden):,} hidden by something", (_opaque(HIDDEN),)),
-            Entry(f"{len(sight.missed):,} in view, but between beams or too faint", (_opaque(MISSED),)),
+            Entry(f"{sight.seen:,} seen{drawn}", (LINES,)),
+            Entry(f"{len(sight.hidden):,} hidden by something", (HIDDEN,)),
+            Entry(f"{len(sight.missed):,} in view, but between beams or too faint", (MISSED,)),
         ),
     )
     return Overlay(layers, lambda _scene: block)
@@ -216,10 +216,6 @@ def _faces(squares: Float) -> NDArray[np.float32]:
     corners = (squares + np.array((0.0, 0.0, ABOVE))).astype(np.float32)
     faces: NDArray[np.float32] = corners[:, [0, 1, 2, 0, 2, 3]].reshape(-1, 3)
     return faces
-
-
-def _opaque(colour: Colour) -> Colour:
-    return (*colour[:3], 1.0)
 
 
 class SEIP_OT_show_sight_lines(ForPlacement, LongWork, bpy.types.Operator):

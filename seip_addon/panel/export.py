@@ -30,28 +30,17 @@ from .survey import with_placement
 from .work import ForPlacement, Job, LongWork, started
 
 
-class _Writes(ForPlacement, LongWork):
-    """Mixin for operators that write the placement into the folder of the result."""
-
-    obstacles = (*ForPlacement.obstacles, no_folder, not_evaluated)
-
-
-def _checked_folder(scene: bpy.types.Scene) -> Path:
-    """Return the folder of the result, which can be written."""
-    folder = saved_path(scene.seip.result.folder, "the result")
-    check_folder(folder)
-    return folder
-
-
-class SEIP_OT_export_result(_Writes, bpy.types.Operator):
-    """Write tables, pictures and the scene with its sensors to the folder, replacing earlier ones"""
+class SEIP_OT_export_result(ForPlacement, LongWork, bpy.types.Operator):
+    """Write the report, tables, pictures and the scene with its sensors to the folder, replacing earlier ones"""
 
     bl_label = "Export"
-    stopped_message = "stopped; nothing was written"
+    obstacles = (*ForPlacement.obstacles, no_folder, not_evaluated)
+    stopped_message = "stopped; no report was written"
 
     def job(self, scene: bpy.types.Scene) -> Job:
         """Save the scene as it is, find the placement again and write it, and report where the files are."""
-        folder = _checked_folder(scene)
+        folder = saved_path(scene.seip.result.folder, "the result")
+        check_folder(folder)
         scene, state = yield started(_exported(folder, scene))
         session.of(scene).state = state
         self.report({"INFO"}, f"written to {folder}")
@@ -59,10 +48,11 @@ class SEIP_OT_export_result(_Writes, bpy.types.Operator):
 
 def _exported(folder: Path, scene: bpy.types.Scene) -> Generator[Progress, None, SceneState]:
     """Write a result: the scene before the first report, which is the part that needs Blender's data."""
-    render, name = scene.seip.result.render, scene.name
+    result, name = scene.seip.result, scene.name
+    render, wants_report = result.render, result.report
     finding = with_placement(scene)
     if coverage_of(scene) is not None:
-        show_seen_by(scene, unpacked_counts(scene.seip.result.seen))  # it may show a comparison, or sensors on the move
+        show_seen_by(scene, unpacked_counts(result.seen))  # it may show a comparison, or sensors on the move
     legend = shown_legend(scene)
     tidy_pieces(scene)
     with result_files(folder) as part:
@@ -81,25 +71,9 @@ def _exported(folder: Path, scene: bpy.types.Scene) -> Generator[Progress, None,
                 sight = yield from render_elsewhere(raw, part["placed.blend"], name, site, deployment)
                 save_labelled_view(part["view.png"], raw, site, deployment, legend, sight, created=created)
     survey.grid.save(folder / "visibility.npz")
+    if wants_report:
+        yield from write_report(folder)
     return state
-
-
-class SEIP_OT_write_report(_Writes, bpy.types.Operator):
-    """Write the files of the placement to the folder, and a report on them as HTML and PDF"""
-
-    stopped_message = "stopped; no report was written"
-
-    def job(self, scene: bpy.types.Scene) -> Job:
-        """Export the placement, write the report, and say where the files are."""
-        folder = _checked_folder(scene)
-        scene, (state, written) = yield started(_reported(folder, scene))
-        session.of(scene).state = state
-        self.report({"INFO"}, f"written: {' and '.join(path.name for path in written)} in {folder}")
-
-
-def _reported(folder: Path, scene: bpy.types.Scene) -> Generator[Progress, None, tuple[SceneState, tuple[Path, ...]]]:
-    state = yield from _exported(folder, scene)
-    return state, (yield from write_report(folder))
 
 
 def draw(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
@@ -108,10 +82,10 @@ def draw(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     if draw_reason(layout, scene_status.no_placement(scene)):
         return
     draw_path(layout, scene.seip.result, "folder")
+    layout.prop(scene.seip.result, "report")
     layout.prop(scene.seip.result, "render")
     draw_reason(layout, scene_status.no_folder(scene) or scene_status.not_evaluated(scene))
-    draw_run(layout, "seip.write_report", icon="FILE_TEXT")
-    draw_run(layout, "seip.export_result", icon="EXPORT", text="Export Files")
+    draw_run(layout, "seip.export_result", icon="EXPORT")
     folder = absolute(scene.seip.result.folder)
     if folder.is_dir():
         layout.operator("wm.path_open", text="Open Folder", icon="FILE_FOLDER").filepath = str(folder)

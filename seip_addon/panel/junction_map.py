@@ -17,7 +17,7 @@ from ..core.output.pictures.palette import MAP_GROUND, MAP_JUNCTION, MAP_STREETS
 from ..core.output.pictures.street_labels import StreetLabel, start_of, street_labels
 from ..core.workflows.site_places import SitePlaces
 from ..core.world.opendrive.junctions import STREETS
-from .legend import FONT, INK, PAPER, TEXT_SIZE, Box, fill, free_frame, write
+from .legend import FONT, INK, PAPER, TEXT_SIZE, Box, Colour, fill, free_frame, write
 from .overlays import viewports
 from .session import session
 from .work import Outcome
@@ -47,9 +47,7 @@ CLICK = 4.0
 """Pixels at the interface's usual scale that the mouse moves at most between press and release of a click."""
 ZOOMS = {"WHEELUPMOUSE": STEP, "WHEELDOWNMOUSE": 1 / STEP, "NUMPAD_PLUS": STEP, "NUMPAD_MINUS": 1 / STEP}
 DRAGGED_BY = {"LEFTMOUSE", "MIDDLEMOUSE"}
-
-
-Colour = tuple[float, float, float, float]
+GROUND, JUNCTION = (*rgb(MAP_GROUND), 1.0), (*rgb(MAP_JUNCTION), 1.0)
 
 
 class StreetMap:
@@ -160,12 +158,11 @@ class StreetMap:
             Name of the junction that is chosen already.
         """
         self.view = self.view.moved_to(self._within(frame))
-        ground = (*rgb(MAP_GROUND), 1.0)
         left, bottom, right, top = map(round, frame)
         before = gpu.state.scissor_get()
         gpu.state.scissor_test_set(True)  # noqa: FBT003  # Blender's own function
         gpu.state.scissor_set(left, bottom, right - left, top - bottom)
-        fill(left, bottom, right - left, top - bottom, (ground, ground))
+        fill(left, bottom, right - left, top - bottom, (GROUND, GROUND))
         self._draw_streets()
         self._draw_names()
         self._draw_junctions(chosen)
@@ -212,7 +209,7 @@ class StreetMap:
             self.labels = street_labels(self.plan.names, self._widths, TEXT_SIZE * self.scale, self.view, dots)
             self._labelled = self.view
         blf.enable(FONT, blf.ROTATION | blf.SHADOW)
-        blf.shadow(FONT, 6, *rgb(MAP_GROUND), 1.0)
+        blf.shadow(FONT, 6, *GROUND)
         blf.color(FONT, *INK)
         for label in self.labels:
             width = width_of(label.name)
@@ -226,14 +223,14 @@ class StreetMap:
         pixels, radii = self.view.to_pixels(self.plan.junctions), self.radii()
         for size in np.unique(radii[shown]):
             of_size = pixels[shown[radii[shown] == size]]
-            _dots(of_size, size + 1.5 * self.scale, (*rgb(MAP_GROUND), 1.0))
-            _dots(of_size, size, (*rgb(MAP_JUNCTION), 1.0))
+            _dots(of_size, size + 1.5 * self.scale, GROUND)
+            _dots(of_size, size, JUNCTION)
         marked = [number for number in shown.tolist() if self.names[number] == chosen or number == self.hovered]
         for number in marked:
             radius = HOVERED * radii[number]
-            _dots(pixels[[number]], radius + 2 * self.scale, (*rgb(MAP_JUNCTION), 1.0))
-            _dots(pixels[[number]], radius, (*rgb(MAP_GROUND), 1.0))
-            _dots(pixels[[number]], radius / 2, (*rgb(MAP_JUNCTION), 1.0))
+            _dots(pixels[[number]], radius + 2 * self.scale, JUNCTION)
+            _dots(pixels[[number]], radius, GROUND)
+            _dots(pixels[[number]], radius / 2, JUNCTION)
             self._draw_name_of(number, pixels[number].tolist(), radius + 6 * self.scale)
 
     def _draw_name_of(self, number: int, at: Sequence[float], above: float) -> None:

@@ -56,7 +56,7 @@ WORK: Mapping[str, tuple[str, ...]] = {
     "simulation": _SIMULATION,
     "scan": _SCAN,
     "detection": _DETECTION,
-    "export": ("write_report", "export_result"),
+    "export": ("export_result",),
 }
 """Long operators whose progress is drawn in each section, which its header shows while the section is closed."""
 

@@ -33,10 +33,10 @@ RISE, PAD, TALL, LABEL_GAP = 16.0, 5.0, 18.0, 2.0
 
 @dataclass(frozen=True)
 class Entry:
-    """A line of a legend: words beside a swatch of one colour, or of several that run into one another."""
+    """A line of a legend: words beside an opaque swatch of one colour, or of several that run into one another."""
 
     words: str
-    colours: tuple[Colour, ...]
+    colours: tuple[Sequence[float], ...]
 
 
 @dataclass(frozen=True)
@@ -110,7 +110,8 @@ def _width(block: Block) -> float:
 
 def _draw_entry(entry: Entry, x: float, y: float, scale: float) -> None:
     fill(x - scale, y + scale, (SWATCH + 2) * scale, 13 * scale, (EDGE, EDGE))
-    ends = entry.colours if len(entry.colours) > 1 else entry.colours * 2
+    ends: list[Colour] = [(red, green, blue, 1.0) for red, green, blue, *_ in entry.colours]
+    ends = ends if len(ends) > 1 else ends * 2
     part = SWATCH * scale / (len(ends) - 1)
     for number, pair in enumerate(pairwise(ends)):
         fill(x + number * part, y + 2 * scale, part, 11 * scale, pair)

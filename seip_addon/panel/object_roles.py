@@ -97,20 +97,11 @@ class SEIP_OT_add_area(InObjectMode, ShortWork, bpy.types.Operator):
         min=0.1,
         soft_max=500.0,
     )
-    turn: bpy.props.FloatProperty(name="Rotation", description="Counter-clockwise angle", subtype="ANGLE")
-    corners: bpy.props.IntProperty(
-        name="Corners",
-        description="Number of corners: 4 for a rectangle, more for an ellipse",
-        default=4,
-        min=3,
-        soft_max=32,
-        max=360,
-    )
 
     def act(self, context: bpy.types.Context) -> None:
         """Add it, selected and active."""
         middle = tuple(context.scene.cursor.location)
-        obj = roles.add_area(context.scene, Role[self.role], middle, tuple(self.size), self.turn, self.corners)
+        obj = roles.add_area(context.scene, Role[self.role], middle, tuple(self.size))
         select_alone(context, obj)
 
 

@@ -194,7 +194,7 @@ def _placed(
     state = yield from surveying
     runs = None if folder is None else (yield from read_runs(found_runs(folder), state.layout))
     check_objective(state.layout.site, state.layout.models, objective)
-    early = yield from early_answer(state.layout, objective, state.grid_file, state.cores)
+    early = yield from early_answer(state.layout, objective, state.grid_file)
     steps = after_early_answer(early, _searched(state, objective, runs, acceptance))
     return (yield from altered(steps, lambda step: _Searching(**vars(step), layout=state.layout)))
 

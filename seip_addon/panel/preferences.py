@@ -18,7 +18,6 @@ from ..core.programs.sumo_installation import BY_HAND, DOWNLOAD_SIZE, install_su
 from ..core.programs.sumo_programs import Sumo, find_sumo, sumo_version
 from ..core.sensing.lidar.catalogue import load_catalogue
 from ..core.sensing.lidar.model import LidarModel
-from ..core.sensing.visibility.ray_casting import MAX_THREADS
 from ..core.workflows.detection import INSTALL, DetectingPython
 from ..core.world.openstreetmap.overpass import EXPORT, OVERPASS, OverpassServer
 from .layout import draw_run, draw_sentence
@@ -122,11 +121,6 @@ def overpass() -> OverpassServer:
     return OverpassServer(_own_folder("openstreetmap"), _given("overpass", "") or OVERPASS, why_no_download())
 
 
-def cores() -> int | None:
-    """Return the number of threads for visibility, or None if it is not set."""
-    return _given("cores", None)
-
-
 def catalogue_files() -> tuple[Path, ...]:
     """Return the user's own catalogues."""
     files: Any = _given("catalogues", ())
@@ -209,13 +203,6 @@ class SEIP_AP_preferences(bpy.types.AddonPreferences):
 
     bl_idname = ADDON_ID
 
-    cores: bpy.props.IntProperty(
-        name="Cores",
-        description="Processor cores that compute visibility at once; more than four rarely help",
-        default=MAX_THREADS,
-        min=1,
-        max=MAX_THREADS,
-    )
     cache: bpy.props.StringProperty(
         name="Cache",
         subtype="DIR_PATH",
@@ -244,7 +231,6 @@ class SEIP_AP_preferences(bpy.types.AddonPreferences):
         """Draw the preferences."""
         layout = self.layout
         layout.use_property_split = True
-        layout.prop(self, "cores")
         layout.prop(self, "cache")
         layout.prop(self, "python")
         layout.prop(self, "sumo")

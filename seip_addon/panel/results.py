@@ -69,6 +69,9 @@ class SEIP_PG_result(SEIP_PG_placement):
     folder: path_property(
         "Folder", "Folder for the result; // is the folder of the .blend", folder=True, default="//seip-result/"
     )
+    report: BoolProperty(
+        name="Include Report", description="Write a report on the placement as HTML and PDF as well", default=True
+    )
     render: BoolProperty(
         name="Include Rendered View",
         description="Add a rendered view of the scene to the files and the report, which takes a minute",

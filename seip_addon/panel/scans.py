@@ -24,7 +24,7 @@ from ..scene.sensors import read_sensors
 from ..scene.traffic import read_traffic
 from . import overlays, preferences
 from .layout import draw_reason, draw_run, draw_sentence, draw_settings
-from .legend import Block, Colour, Entry
+from .legend import Block, Entry
 from .overlays import Layer, Overlay
 from .scene_status import no_sensors
 from .session import LastScan, session
@@ -65,19 +65,14 @@ def _entries(frame: Frame, sensors: Sequence[MountedSensor], by: By) -> tuple[En
     if by == "sensor":
         counts = np.bincount(frame.sensor, minlength=len(sensors))
         return tuple(
-            Entry(f"{sensor.label}  {sensor.model.key}  {count:,}", (_opaque(rgb(sensor_colour(number))),))
+            Entry(f"{sensor.label}  {sensor.model.key}  {count:,}", (rgb(sensor_colour(number)),))
             for number, (sensor, count) in enumerate(zip(sensors, counts.tolist(), strict=True))
         )
     if by == "intensity":
-        ramp = tuple(_opaque(colour) for colour in strength_ramp(np.linspace(0.0, 1.0, RAMP_STEPS)).tolist())
-        return (Entry(f"intensity 0 to {MAX_INTENSITY:g} and more", ramp),)
-    users = tuple(_opaque(colour) for colour in ((1.0, 0.4, 0.4), (0.4, 1.0, 0.6), (0.4, 0.6, 1.0)))
-    return (Entry("one colour for each road user", users), Entry("standing still", (_opaque(rgb(STATIC_COLOUR)),)))
-
-
-def _opaque(colour: Sequence[float]) -> Colour:
-    red, green, blue = colour
-    return red, green, blue, 1.0
+        ramp = strength_ramp(np.linspace(0.0, 1.0, RAMP_STEPS)).tolist()
+        return (Entry(f"intensity 0 to {MAX_INTENSITY:g} and more", tuple(ramp)),)
+    users = ((1.0, 0.4, 0.4), (0.4, 1.0, 0.6), (0.4, 0.6, 1.0))
+    return (Entry("one colour for each road user", users), Entry("standing still", (rgb(STATIC_COLOUR),)))
 
 
 def why_no_scan(scene: bpy.types.Scene) -> str:

@@ -126,8 +126,6 @@ class SceneState:
         Whether the scene has changed since.
     grid_file : Path
         Where the cache keeps the visibility grid, by the preferences at the last request.
-    cores : int or None
-        Number of threads, or None if it is not set.
     catalogues : tuple
         The user's catalogue files and when each was last written.
     solution : Solution or None
@@ -141,7 +139,6 @@ class SceneState:
     inputs: Mapping[str, str]
     watch: Watch
     grid_file: Path
-    cores: int | None
     catalogues: tuple[tuple[Path, int], ...]
     warnings: tuple[str, ...] = ()
     solution: Solution | None = None

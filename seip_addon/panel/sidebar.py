@@ -106,8 +106,10 @@ class SEIP_PT_steps(Sidebar, bpy.types.Panel):
         parts = {"site": site_check, "sensors": sensors, "placement": placement}
         draw_sections(layout, steps, context, {name: part.status(scene) for name, part in parts.items()})
         layout.separator(type="LINE")
-        traffic_changed = any(one.changed for one in _traffic(scene).values())
-        states = {"results": Status(scene_status.is_changed(scene)), "traffic": Status(traffic_changed)}
+        states = {
+            "results": Status(scene_status.is_changed(scene)),
+            "traffic": Status(detection.status(scene).changed),
+        }
         after = {"results": results.draw, "traffic": draw_traffic, "export": export.draw}
         draw_sections(layout, after, context, states)
 
@@ -115,20 +117,8 @@ class SEIP_PT_steps(Sidebar, bpy.types.Panel):
 def draw_traffic(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     """Draw traffic, and the sections of all that is done with it."""
     traffic.draw(layout, context)
-    parts = {
-        "simulation": traffic.draw_simulation,
-        "scan": scans.draw_scan,
-        "detection": detection.draw,
-    }
-    draw_sections(layout, parts, context, _traffic(context.scene))
-
-
-def _traffic(scene: bpy.types.Scene) -> dict[str, Status]:
-    """Return the status of each section below traffic that has one."""
-    return {
-        "simulation": traffic.simulation_status(scene),
-        "detection": detection.status(scene),
-    }
+    parts = {"simulation": traffic.draw_simulation, "scan": scans.draw_scan, "detection": detection.draw}
+    draw_sections(layout, parts, context, {"detection": detection.status(context.scene)})
 
 
 class SEIP_FH_map(bpy.types.FileHandler):

@@ -22,13 +22,7 @@ from ..scene import contract
 from ..scene.build import build_scene, remove_site, remove_startup_objects
 from ..scene.views import frame_site
 from . import overlays, preferences, scene_status, sensors, traffic
-from .layout import (
-    draw_path,
-    draw_run,
-    draw_sections,
-    draw_sentence,
-    settings_column,
-)
+from .layout import draw_path, draw_run, draw_sections, draw_sentence, settings_column
 from .object_roles import ROLE_ITEMS, WritesScene, draw_roles
 from .preferences import overpass, sumo_folders
 from .properties import absolute, as_typed, complaint, of_setting, path_property

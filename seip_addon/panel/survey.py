@@ -12,7 +12,7 @@ from collections.abc import Generator, Iterable
 from dataclasses import replace
 
 import bpy
-from bpy.props import BoolProperty, CollectionProperty, EnumProperty, FloatProperty, StringProperty
+from bpy.props import BoolProperty, CollectionProperty, FloatProperty, StringProperty
 
 from ..core.base.errors import SeipError
 from ..core.base.progress import Progress
@@ -105,17 +105,6 @@ class SEIP_PG_survey(bpy.types.PropertyGroup):
         subtype="FILE_PATH",
         options={"PATH_SUPPORTS_BLEND_RELATIVE"},
     )
-    solver: EnumProperty(
-        name="Solver",
-        description="MILP solver",
-        items=(
-            ("auto", "Automatic", "HiGHS where it is installed, else CBC"),
-            ("highs", "HiGHS", "Comes with the extension"),
-            ("cbc", "CBC", "Comes with PuLP"),
-            ("gurobi", "Gurobi", "Needs your own installation and licence"),
-        ),
-        default="auto",
-    )
     effort: FloatProperty(
         name="Search Time",
         description=(
@@ -174,7 +163,6 @@ class SEIP_PG_survey(bpy.types.PropertyGroup):
             grid_spacing=as_typed(self.grid),
             catalogue=catalogue_files(),
             installed_cost=self._installed_cost(),
-            solver=self.solver,
             effort=as_typed(self.effort),
         )
 
@@ -194,7 +182,7 @@ class SEIP_PG_survey(bpy.types.PropertyGroup):
         self.fog = math.isfinite(weather.visibility)
         if self.fog:
             self.visibility = weather.visibility
-        self.installed, self.solver, self.effort = request.installed_cost is not None, request.solver, request.effort
+        self.installed, self.effort = request.installed_cost is not None, request.effort
 
     def _installed_cost(self) -> InstalledCost | None:
         if not self.installed:
@@ -214,12 +202,12 @@ def read_layout(scene: bpy.types.Scene) -> Generator[Progress, None, SceneState]
     settings = scene.seip.survey.settings()
     settings.models()  # refuses before the scene is read
     catalogues = tuple((path, path.stat().st_mtime_ns) for path in settings.catalogue)
-    cache, cores = preferences.cache_folder(), preferences.cores()
+    cache = preferences.cache_folder()
     state, known = session.of(scene).state, None
     if state is not None and not state.watch.look(scene) and state.catalogues == catalogues:
         if same_grid(settings, state.layout.settings):
             layout = replace(state.layout, settings=settings)
-            known = replace(state, layout=layout, grid_file=cache / state.grid_file.name, cores=cores)
+            known = replace(state, layout=layout, grid_file=cache / state.grid_file.name)
         reading, watching = SceneReading(state.layout.geometry, state.warnings), state.watch
     else:
         watching, reading = watch(scene), read_scene(scene)
@@ -234,7 +222,7 @@ def read_layout(scene: bpy.types.Scene) -> Generator[Progress, None, SceneState]
         durations = {"read the scene": seconds, "lay out the site": time.perf_counter() - began}
         inputs = inputs_of(layout)
         file = cache / f"{inputs['visibility'][:32]}.npz"
-        return SceneState(layout, inputs, watching, file, cores, catalogues, reading.warnings, durations=durations)
+        return SceneState(layout, inputs, watching, file, catalogues, reading.warnings, durations=durations)
 
     return steps()
 
@@ -248,7 +236,7 @@ def with_visibility(state: SceneState) -> Generator[Progress, None, tuple[SceneS
         check_folder(state.grid_file.parent)
     except SeipError as error:
         raise SeipError(f"{error} as Cache in the add-on's preferences") from error
-    survey = yield from see(state.layout, state.grid_file, threads=state.cores)
+    survey = yield from see(state.layout, state.grid_file)
     return replace(state, layout=survey, durations=state.timed("visibility", began)), survey
 
 
@@ -304,5 +292,5 @@ def draw_candidates(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
 
 
 def draw_search(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
-    """Draw the solver and its limit."""
-    draw_settings(layout, scene.seip.survey, "solver", "effort")
+    """Draw the limit of the search."""
+    draw_settings(layout, scene.seip.survey, "effort")

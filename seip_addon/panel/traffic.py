@@ -24,7 +24,7 @@ from ..scene import contract
 from ..scene.read import read_scene
 from ..scene.traffic import animate, clear_traffic
 from . import preferences, scans, scene_status
-from .layout import Status, draw_path, draw_reason, draw_run, draw_sentence, draw_settings
+from .layout import draw_path, draw_reason, draw_run, draw_sentence, draw_settings
 from .properties import absolute, as_typed, of_setting, path_property, saved_path
 from .work import Job, LongWork, ShortWork
 
@@ -38,7 +38,6 @@ NO_FILE = "There is no traffic file: name one, or animate objects of your own in
 _MOST_SECONDS = 3600.0
 NO_MAP = "There is no map to simulate traffic on: name the OpenDRIVE map (.xodr) that this site was built from."
 USED = "Detection and placements in traffic use these runs."
-OTHER_SETTINGS = "The settings have changed since: simulate again."
 
 
 class SEIP_PG_traffic(bpy.types.PropertyGroup):
@@ -147,7 +146,6 @@ class SEIP_PG_simulation(bpy.types.PropertyGroup):
         "Folder", "Folder for the runs only; // is the folder of the .blend", folder=True, default="//seip-traffic/"
     )
     facts: StringProperty(name="Simulated", description="Summary of the last simulation")
-    made_with: StringProperty(name="Made With", description="Settings of the last simulation")
 
     def street_map(self) -> Path | bpy.types.Text | None:
         """Return the map that traffic is simulated on: a file, which may not exist, a text, or None."""
@@ -166,12 +164,6 @@ class SEIP_PG_simulation(bpy.types.PropertyGroup):
         """Return the settings of the runs as the core takes them."""
         demand = Demand(flow=as_typed(self.flow), pedestrians=as_typed(self.pedestrians))
         return SimulationSettings(demand, duration=as_typed(self.duration))
-
-    def key(self) -> str:
-        """Return all that the runs follow from, as one text."""
-        return "|".join(
-            (self.map, *(f"{value:g}" for value in (self.flow, self.pedestrians, self.duration, self.count)))
-        )
 
 
 def why_no_simulation(scene: bpy.types.Scene) -> str:
@@ -197,7 +189,7 @@ class SEIP_OT_simulate_traffic(LongWork, bpy.types.Operator):
         found = request.street_map()
         if found is None:
             raise SeipError(NO_MAP)
-        named, key = request.folder, request.key()
+        named = request.folder
         geometry = read_scene(scene).geometry
         more = (request.settings(), request.count, geometry, saved_path(request.folder, "the runs of traffic"))
         if isinstance(found, Path):
@@ -209,7 +201,7 @@ class SEIP_OT_simulate_traffic(LongWork, bpy.types.Operator):
         first = str(result.paths[0])
         seip.traffic.file = bpy.path.relpath(first) if named.startswith("//") else first
         seip.traffic.runs = named
-        seip.simulation.facts, seip.simulation.made_with = result.summary, key
+        seip.simulation.facts = result.summary
         show_traffic(scene, result.first, result.warnings[0])
         self.warn(result.messages)
         self.report({"INFO"}, f"{result.summary}; press play")
@@ -221,12 +213,6 @@ def _simulated_on_text(name: str, text: str, *more: Any) -> Generator[Progress, 
         path = Path(folder) / Path(name).name
         path.write_text(text, encoding="utf-8")
         return (yield from simulate_runs(path, *more))
-
-
-def simulation_status(scene: bpy.types.Scene) -> Status:
-    """Return whether the settings have changed since the last simulation."""
-    simulation = scene.seip.simulation
-    return Status(bool(simulation.facts) and simulation.made_with != simulation.key())
 
 
 def draw(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
@@ -259,8 +245,5 @@ def draw_simulation(layout: bpy.types.UILayout, context: bpy.types.Context) -> N
     reason = why_no_simulation(scene)
     draw_reason(layout, "" if preferences.sumo() is None else reason)  # without SUMO the sentence is there already
     draw_run(layout, "seip.simulate_traffic")
-    if not simulation.facts:
-        return
-    draw_sentence(layout, f"{simulation.facts}. {USED}")
-    if simulation_status(scene).changed:
-        draw_sentence(layout, OTHER_SETTINGS, icon="ERROR")
+    if simulation.facts:
+        draw_sentence(layout, f"{simulation.facts}. {USED}")

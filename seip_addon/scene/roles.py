@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable
 
 import bpy
-import numpy as np
 
 from ..core.base.errors import SeipError
 from ..core.site.roles import AREA_OVERLAYS, Role
@@ -99,10 +97,8 @@ def add_area(
     role: Role,
     middle: tuple[float, float, float],
     size: tuple[float, float],
-    turn: float,
-    corners: int,
 ) -> bpy.types.Object:
-    """Add a flat polygon in a role, ready to be edited.
+    """Add a flat rectangle in a role, ready to be edited.
 
     Parameters
     ----------
@@ -111,27 +107,16 @@ def add_area(
     middle : (3,) float, metres
         Of the area; it is laid a little higher, so as to be seen above the road.
     size : (2,) float, metres
-        Along x and y before it is turned.
-    turn : float, radians
-        Counter-clockwise.
-    corners : int
-        Four make a rectangle, more an ellipse.
+        Along x and y.
     """
     above, shade = AREA_OVERLAYS[role]
     name = role.value.capitalize()
     mesh = bpy.data.meshes.new(name)
-    mesh.from_pydata(_polygon(size, corners), [], [tuple(range(corners))])
+    x, y = size[0] / 2, size[1] / 2
+    mesh.from_pydata([(-x, -y, 0.0), (x, -y, 0.0), (x, y, 0.0), (-x, y, 0.0)], [], [(0, 1, 2, 3)])
     mesh.materials.append(material(shade))
     obj = bpy.data.objects.new(name, mesh)
     obj.location = (middle[0], middle[1], middle[2] + above)
-    obj.rotation_euler = (0.0, 0.0, turn)
     obj.hide_render = True
     contract.find_or_make(scene, ROLES[role]).objects.link(obj)
     return obj
-
-
-def _polygon(size: tuple[float, float], corners: int) -> list[tuple[float, float, float]]:
-    angle = 2 * math.pi * (np.arange(corners) + 0.5) / corners
-    reach = math.sqrt(0.5) if corners == 4 else 0.5  # a rectangle's corners lie on its sides' lines
-    x, y = reach * size[0] * np.cos(angle), reach * size[1] * np.sin(angle)
-    return [(float(a), float(b), 0.0) for a, b in zip(x, y, strict=True)]

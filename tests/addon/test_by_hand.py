@@ -31,7 +31,7 @@ ROOT = Path(__file__).resolve().parents[2]
 def placed(junction, tmp_path):
     scene = junction
     scene.seip.goal.count = 3
-    scene.seip.result.folder = str(tmp_path / "out")
+    scene.seip.result.folder, scene.seip.result.report = str(tmp_path / "out"), False
     bpy.ops.seip.solve_placement()
     return scene
 

@@ -26,7 +26,7 @@ def stand_in(monkeypatch, tmp_path, online):
     monkeypatch.delenv("http_proxy", raising=False)
     monkeypatch.setattr(preferences, "_own_folder", lambda name: tmp_path / name)
     with overpass_server() as running:
-        values = SimpleNamespace(overpass=running.address, sumo="", python="", catalogues=(), cores=None)
+        values = SimpleNamespace(overpass=running.address, sumo="", python="", catalogues=())
         monkeypatch.setattr(preferences, "own", lambda: values)
         running.answers = [Answer(overpass_xml(crossing()))] * 3
         yield running

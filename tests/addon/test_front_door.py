@@ -179,7 +179,7 @@ def test_all_sections_open_without_and_with_a_placement(junction, monkeypatch):
     bpy.types.SEIP_PT_steps.draw(panel, bpy.context)
     drawn = {name for name, _ in panel.layout.operators}
     assert {"seip.check_site", "seip.choose_sensors", "seip.solve_placement"} <= drawn
-    assert {"seip.write_report", "seip.export_result", "seip.show_comparison"} <= drawn
+    assert {"seip.export_result", "seip.show_comparison"} <= drawn
     menu = {f"seip.{name}" for step in sidebar.STEPS for name in step}
     own = {name.partition(".")[2] for name in drawn | menu if name.startswith("seip.")}
     assert all(hasattr(bpy.types, f"SEIP_OT_{name}") for name in own)

@@ -35,7 +35,7 @@ def labels(scene: bpy.types.Scene) -> list[str]:
 def test_panel_and_batch_write_the_same_placement(junction, tmp_path, small_scene):
     assert bpy.ops.seip.solve_placement() == {"FINISHED"}
     junction.seip.result.folder = str(tmp_path / "panel")
-    assert bpy.ops.seip.write_report() == {"FINISHED"}  # exports what it needs
+    assert bpy.ops.seip.export_result() == {"FINISHED"}
     assert (tmp_path / "panel" / "report.pdf").is_file()
     assert "With fewer or more sensors under the same rules" in (tmp_path / "panel" / "report.html").read_text(
         encoding="utf-8"
@@ -165,7 +165,7 @@ def test_a_saved_placement_goes_on_without_computing(junction, tmp_path, monkeyp
     assert scene.seip.result.record == before
     for forbidden in ("sensing.visibility.grid.compute_visibility", "workflows.placing.optimise"):
         monkeypatch.setattr(f"seip_addon.core.{forbidden}", None)
-    scene.seip.result.folder = "//out/"
+    scene.seip.result.folder, scene.seip.result.report = "//out/", False
     assert bpy.ops.seip.export_result() == {"FINISHED"}
     assert comparable(load_placement(tmp_path / "out" / "placement.json")) == comparable(parsed_record(before))
 

@@ -112,9 +112,6 @@ def test_runs_are_those_of_the_command_and_used_by_the_next_buttons(site, tmp_pa
     text = drawn().text
     assert "2 runs, " in text
     assert panel.USED in text
-    assert panel.OTHER_SETTINGS not in text
-    seip.simulation.flow = 500.0
-    assert panel.OTHER_SETTINGS in drawn().text
     traffic.main([
         str(SCENES / "junction.blend"), "--simulate", str(SCENES / "junction.xodr"), "--flow", "450",
         "--pedestrians", "60", "--duration", "5", "--seed", "2", "-o", str(tmp_path / "2.npz"),

@@ -213,7 +213,7 @@ def _report(window: Window) -> Steps:
     _scene().seip.result.folder = str(FOLDER)
     bpy.context.window_manager.seip_sections.placement = False
     yield from window.open_section("export")
-    yield from window.click("seip.write_report(")
+    yield from window.click("seip.export_result(")
     yield from window.until(lambda: session.running is None and (FOLDER / "report.pdf").exists(), 200)
     record = _record()
     written = json.loads((FOLDER / "placement.json").read_text(encoding="utf-8"))
