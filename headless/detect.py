@@ -117,7 +117,7 @@ def _options(argv: list[str]) -> argparse.Namespace:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = new_parser("detect", "Detect road users in simulated scans of a scene, or in a recording.")
+    parser = new_parser("seip detect", "Detect road users in simulated scans of a scene, or in a recording.")
     parser.add_argument(
         "scene", nargs="?", type=Path, help="the .blend with its sensors (in Blender the open scene), or a recording"
     )

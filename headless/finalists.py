@@ -118,7 +118,7 @@ def main(argv: list[str]) -> None:
     """Judge the finalists of a file in runs of traffic, and write the judgement to a file."""
     from headless.detection.judging import judge_finalists  # noqa: PLC0415  # needs torch
 
-    parser = new_parser("finalists", "Choose among placements by what a detector finds with them.")
+    parser = new_parser("python -m headless.finalists", "Choose among placements by what a detector finds with them.")
     parser.add_argument("scene", type=Path, help="the .blend")
     parser.add_argument("finalists", type=Path, help="file with the finalists")
     parser.add_argument("judgement", type=Path, help="file to write")

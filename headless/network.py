@@ -197,7 +197,7 @@ def _duration(seconds: float) -> str:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = new_parser("network", "Spread one budget over the junctions of a network, with a proven gap.")
+    parser = new_parser("seip network", "Spread one budget over the junctions of a network, with a proven gap.")
     parser.add_argument("source", type=Path, help="extract of OpenStreetMap, or table of sites (CSV)")
     parser.add_argument("-o", "--output", type=Path, required=True, help="folder for the results")
     chosen = parser.add_argument_group("sites")

@@ -197,7 +197,7 @@ def _add_finalists(parser: argparse.ArgumentParser) -> None:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = new_parser("place", "Place roadside LiDARs in a scene.")
+    parser = new_parser("seip place", "Place roadside LiDARs in a scene.")
     survey.add_options(parser)
     add_objective(parser)
     _add_finalists(parser)

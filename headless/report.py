@@ -28,7 +28,7 @@ def main(argv: list[str]) -> None:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = new_parser("report", "Write a report on a placement into its folder, as HTML and PDF.")
+    parser = new_parser("seip report", "Write a report on a placement into its folder, as HTML and PDF.")
     parser.add_argument("folder", type=Path, help="result folder of `seip place`")
     return parser
 

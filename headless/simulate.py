@@ -93,7 +93,7 @@ def _summary(manifest: Record) -> str:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = new_parser("simulate", "Simulate what the sensors of a scene measure of its traffic.")
+    parser = new_parser("seip simulate", "Simulate what the sensors of a scene measure of its traffic.")
     parser.add_argument("scene", nargs="?", type=Path, help="the .blend with its sensors; in Blender the open scene")
     parser.add_argument("-o", "--output", type=Path, required=True, help="folder of the run")
     parser.add_argument(

@@ -97,7 +97,7 @@ def _describe(trajectories: Trajectories) -> str:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = new_parser("traffic", "Put traffic on the road of a scene.")
+    parser = new_parser("seip traffic", "Put traffic on the road of a scene.")
     parser.add_argument("scene", nargs="?", type=Path, help="the .blend; in Blender the open scene")
     parser.add_argument("-o", "--output", type=Path, required=True, metavar="NPZ", help="file for the trajectories")
     parser.add_argument(

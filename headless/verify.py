@@ -79,7 +79,7 @@ def _lines(record: VerificationRecord) -> Iterator[str]:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = new_parser("verify", "Compare installed sensors with their plan, by a recording.")
+    parser = new_parser("seip verify", "Compare installed sensors with their plan, by a recording.")
     parser.add_argument("scene", type=Path, help="the .blend of the plan, with its sensors")
     parser.add_argument("recording", type=Path, help="folder of sweeps, or of a folder for each sensor")
     parser.add_argument("-o", "--output", type=Path, required=True, help="folder for the results")

@@ -16,7 +16,7 @@ def study_parser(name: str, description: str) -> argparse.ArgumentParser:
     name : str
         Name of the study.
     """
-    parser = new_parser(f"study {name}", description)
+    parser = new_parser(f"seip study {name}", description)
     survey.add_options(parser)
     parser.set_defaults(sensor=PAPER_TYPES)
     return parser

@@ -63,10 +63,10 @@ def test_what_is_typed_reaches_its_setting_or_is_refused(typed, kind, changed):
 
 def test_help_has_a_line_for_each_option_and_names_its_default(monkeypatch):
     monkeypatch.setenv("COLUMNS", "120")
-    parser = new_parser("place", "Place sensors.")
+    parser = new_parser("seip place", "Place sensors.")
     add_options(parser)
     lines = parser.format_help().splitlines()
-    assert lines[0] == "usage: place [scene] -o OUTPUT [options]"
+    assert lines[0] == "usage: seip place [scene] -o OUTPUT [options]"
     texts = [" ".join(line.split()) for line in lines]
     assert "-o, --output OUTPUT folder for the results" in texts
     assert "--sensor KEY ... types to choose from (default: os1_128)" in texts

@@ -102,7 +102,7 @@ def _parts(estimate: IntervalEstimate, scale: float) -> tuple[float, ...]:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = new_parser("study open-benchmark", "Score placement criteria on ten junctions.")
+    parser = new_parser("seip study open-benchmark", "Score placement criteria on ten junctions.")
     action = parser.add_mutually_exclusive_group(required=True)
     action.add_argument("--build", action="store_true", help="build the sites and the table of placements")
     action.add_argument(

@@ -157,7 +157,7 @@ def _facts(
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = new_parser("study paper", "Reproduce the paper's case study on your map, and compare the figures.")
+    parser = new_parser("seip study paper", "Reproduce the paper's case study on your map, and compare the figures.")
     parser.add_argument("map", type=Path, help="the OpenDRIVE map (.xodr): Town05 of CARLA for the paper's case")
     parser.add_argument(
         "--junction", nargs="+", required=True, metavar="NAME", help="id, name or streets of the junction"

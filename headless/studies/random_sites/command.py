@@ -34,7 +34,7 @@ def main(argv: list[str]) -> None:
 
 def _parser() -> argparse.ArgumentParser:
     defaults = SiteSettings()
-    parser = new_parser("study random-sites", "Generate random sites with traffic, to train detectors on.")
+    parser = new_parser("seip study random-sites", "Generate random sites with traffic, to train detectors on.")
     parser.add_argument("-o", "--output", type=Path, required=True, help="folder for the sites, one folder each")
     parser.add_argument(
         "--sites", type=whole_number(SITES), default=8, metavar="N", help="number of sites; existing ones are kept"

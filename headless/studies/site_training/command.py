@@ -194,7 +194,7 @@ def random_placement(
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = new_parser("study site-training", "Train a detector on random placements at several sites.")
+    parser = new_parser("seip study site-training", "Train a detector on random placements at several sites.")
     parser.add_argument(
         "scenes", nargs="+", type=Path, metavar="SCENE", help="scenes (.blend), each with its traffic next to it"
     )
