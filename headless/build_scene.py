@@ -97,7 +97,9 @@ _text_or_number.__name__ = NUMBER
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = new_parser("seip build-scene", "Build a Blender scene from an OpenDRIVE map or an extract of OpenStreetMap.")
+    parser = new_parser(
+        "seip build-scene", "Build a Blender scene from an OpenDRIVE map or an extract of OpenStreetMap."
+    )
     parser.add_argument(
         "source",
         type=Path,

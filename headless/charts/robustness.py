@@ -34,7 +34,7 @@ from seip_addon.core.output.pictures.palette import INK, SEEN_COLOURS, SERIES_CO
 from seip_addon.core.output.pictures.plan_map import MAX_GAP, draw_area
 from seip_addon.core.output.results.file_names import POSE_ERROR_PICTURES, TRAFFIC_PICTURE
 from seip_addon.core.site.scene_geometry import SceneGeometry, joined
-from seip_addon.core.site.target_squares import target_squares
+from seip_addon.core.site.targets import target_squares
 from seip_addon.core.workflows.survey import Survey
 
 FIGURE_SIZE = (7.6, 4.4)  # inches

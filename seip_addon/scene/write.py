@@ -15,7 +15,7 @@ from ..core.geometry.solids import Solid, join, prism, tube
 from ..core.output.pictures.colours import Aspect, Colouring, Legend, as_placed, colouring
 from ..core.site.roles import AREA_OVERLAYS
 from ..core.site.site import Site, Targets
-from ..core.site.target_squares import target_squares
+from ..core.site.targets import target_squares
 from . import contract
 from .materials import linear, matt
 from .meshes import mesh_of

@@ -15,7 +15,6 @@ from ..base.counts import counted
 from ..base.errors import SeipError
 from ..base.progress import Progress
 from ..geometry.plan import outline, signed_area, surface_height
-from ..storage.files import digest
 from .scene_geometry import ASSUMED, Pole, SceneGeometry
 from .site import Site
 
@@ -29,10 +28,6 @@ MAX_POLE_DISTANCE = 60.0
 """Metres from the region beyond which a pole probably belongs to a different place."""
 MAX_FOOT_OFFSET = 0.5
 """Metres between a pole's foot and the ground beyond which sensors would be at a wrong height."""
-MAX_HOLE_AREA = 10.0
-"""Square metres in plan up to which a hole in the road is a missing face rather than an island."""
-MIN_HOLE_AREA = 0.01
-"""Square metres in plan below which a hole is a seam."""
 SAME_POLE_DISTANCE = 0.05
 """Metres in plan within which two poles count as being in one place."""
 MAX_NAMED = 5
@@ -228,8 +223,6 @@ def _problems(contents: SceneContents, plans: dict[str, BaseGeometry]) -> Iterat
     yield from _upright(contents)
     yield from _without_road(contents, plans)
     yield from _pole_problems(contents, plans["region"])
-    yield from _duplicates(contents)
-    yield from _holes(contents, plans)
 
 
 def _missing(contents: SceneContents, plans: dict[str, BaseGeometry]) -> Iterator[Problem]:
@@ -262,9 +255,10 @@ def _far(contents: SceneContents) -> Iterator[Problem]:
     far = [(reach, name) for reach, name in reaches if reach > MAX_ORIGIN_DISTANCE]
     if far:
         reach, name = max(far)
+        others = f" and {counted(len(far) - 1, 'other object')} lie up to" if len(far) > 1 else " lies"
         yield Problem(
             "WARNING",
-            f"{name!r} and {counted(len(far) - 1, 'other object')} lie up to {reach / 1000:,.0f} km from the origin, "
+            f"{name!r}{others} {reach / 1000:,.0f} km from the origin, "
             f"where Blender rounds coordinates to {1000 * np.spacing(np.float32(reach)):.0f} mm: move all to the "
             "origin, and store the map coordinates of the origin in the scene's property seip_origin.",
             name,
@@ -369,54 +363,3 @@ def _named(culprits: list[tuple[str, str]], one: str, several: str) -> Iterator[
     rest = culprits[MAX_NAMED:]
     if rest:
         yield Problem("WARNING", f"{counted(len(rest), f'more {one}', f'more {several}')}.", rest[0][0])
-
-
-def _duplicates(contents: SceneContents) -> Iterator[Problem]:
-    first: dict[tuple[str, str], str] = {}
-    for surface in contents.surfaces:
-        key = (surface.role, digest(np.round(surface.triangles, 4)))
-        if key in first and surface.role == "weighted_regions":
-            yield Problem(
-                "WARNING",
-                f"The weighted regions {first[key]!r} and {surface.name!r} are the same: their weights multiply; "
-                "remove one.",
-                surface.name,
-            )
-        elif key in first:
-            yield Problem(
-                "WARNING",
-                f"{first[key]!r} and {surface.name!r} among the {ROLES[surface.role].lower()} are the same: "
-                "rays are cast at both; remove one.",
-                surface.name,
-            )
-        first.setdefault(key, surface.name)
-
-
-def _holes(contents: SceneContents, plans: dict[str, BaseGeometry]) -> Iterator[Problem]:
-    region, road = plans["region"], plans["roads"]
-    rings = [ring for part in shapely.get_parts(road) if part.geom_type == "Polygon" for ring in part.interiors]
-    areas = [shapely.Polygon(ring) for ring in rings]
-    holes = [hole for hole in areas if MIN_HOLE_AREA < hole.area <= MAX_HOLE_AREA and hole.intersects(region)]
-    if holes:
-        largest = max(holes, key=lambda hole: float(hole.area))
-        yield Problem(
-            "WARNING",
-            f"The road has {counted(len(holes), 'hole')} of up to {largest.area:.2g} m², as at {_place(largest)}: "
-            "there are no targets in them; add the missing faces, unless they are islands.",
-            _nearest_road(contents, largest),
-        )
-
-
-def _nearest_road(contents: SceneContents, place: BaseGeometry) -> str:
-    """Return the name of the road object with the face nearest to a place in plan."""
-    centre = np.array(place.centroid.coords[0])
-
-    def distance(surface: Surface) -> float:
-        return float(np.hypot(*(surface.triangles[:, :, :2] - centre).reshape(-1, 2).T).min())
-
-    return min(_of(contents, "roads"), key=distance).name
-
-
-def _place(area: BaseGeometry) -> str:
-    middle = area.centroid
-    return f"({middle.x:.0f}, {middle.y:.0f})"

@@ -52,15 +52,6 @@ def test_a_region_beside_the_road_is_an_error_and_one_of_two_a_warning():
     assert one(found(*SOUND.surfaces, beside), "no road within") == ("WARNING", "beside")
 
 
-def test_a_missing_face_is_a_hole_and_an_island_is_none():
-    around = [(-50, -4, 50, -1), (-50, -1, -1, 1), (1, -1, 50, 1), (-50, 1, 50, 4)]
-    holed = Surface("roads", "holed", np.concatenate([sheet(*box) for box in around]))
-    assert one(found(holed, REGION, PAVEMENT), "1 hole of up to 4 m²") == ("WARNING", "holed")
-    wide = [(-50, -4, 50, -1), (-50, -1, -10, 1), (10, -1, 50, 1), (-50, 1, 50, 4)]
-    island = Surface("roads", "island", np.concatenate([sheet(*box) for box in wide]))
-    assert found(island, REGION, PAVEMENT) == []
-
-
 def test_no_warning_is_about_an_object_that_the_builder_made():
     beside = moved(REGION, y=200, name="beside")
     far, twin = Pole("far", np.array([0.0, 500.0, 0.0])), Pole("twin", np.array([10.0, 5.0, 0.0]))

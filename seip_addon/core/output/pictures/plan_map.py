@@ -19,7 +19,7 @@ from ...choosing.placement.deployment import Deployment
 from ...geometry.plan import closed, outline
 from ...site.scene_geometry import ASSUMED, OTHER_LEVELS, Mesh, SceneGeometry
 from ...site.site import Site
-from ...site.target_squares import target_squares
+from ...site.targets import target_squares
 from .colours import of_placement
 from .drawing import MARK_RADIUS, Style, Window, draw_polygons, is_writable, text_width
 from .palette import ASSUMED_POLE_COLOUR, FORBIDDEN, INK, MANDATORY, PAPER, POLE_COLOUR, WEIGHTED

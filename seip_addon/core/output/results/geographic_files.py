@@ -21,7 +21,7 @@ from ...geometry.orientation import degrees, tilt_degrees
 from ...geometry.plan import closed
 from ...site.scene_geometry import NamedArea, SceneGeometry
 from ...site.site import Site
-from ...site.target_squares import target_squares
+from ...site.targets import target_squares
 from ...storage.files import whole_file
 from ..pictures.palette import SEEN_COLOURS, WEIGHTED
 

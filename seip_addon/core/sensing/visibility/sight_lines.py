@@ -9,7 +9,7 @@ import numpy as np
 from ...base.arrays import Boolean, Float, Integer
 from ...site.candidates import Candidates
 from ...site.site import Site
-from ...site.target_squares import target_squares
+from ...site.targets import target_squares
 from ..lidar.model import LidarModel
 from .ray_casting import engine_name, make_ray_caster
 from .settings import Engine
