@@ -98,17 +98,23 @@ def _not_starting(programs: Sumo, complaint: str) -> SeipError:
     return SeipError(f"SUMO does not start from {programs.netconvert.parent}{reason}: install it again")
 
 
-def run(programs: Sumo, program: Path, arguments: Sequence[object], what: str) -> Generator[Progress, None, None]:
+def run(
+    programs: Sumo, program: Path, arguments: Sequence[object], what: str, folder: Path
+) -> Generator[Progress, None, None]:
     """Run a program of SUMO to its end.
+
+    It takes commas and colons in a path for separators: the paths of files are given by their names in a folder.
 
     Parameters
     ----------
     program : Path
         Program to run, one of ``programs``.
     arguments : sequence of object
-        Arguments of the program.
+        Arguments of the program; paths are those of files in the folder.
     what : str
         Description of the work for the user.
+    folder : Path
+        Working folder of the program.
 
     Raises
     ------
@@ -118,7 +124,8 @@ def run(programs: Sumo, program: Path, arguments: Sequence[object], what: str) -
     environment = os.environ | ({} if programs.home is None else {"SUMO_HOME": str(programs.home)})
 
     process = subprocess.Popen(  # noqa: S603  # SUMO's program, found by its name, and our arguments
-        [str(part) for part in (program, *arguments)],
+        [str(program.absolute()), *(part.name if isinstance(part, Path) else str(part) for part in arguments)],
+        cwd=folder,
         env=environment,
         stdin=subprocess.DEVNULL,
         stdout=subprocess.DEVNULL,

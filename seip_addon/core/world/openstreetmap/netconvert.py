@@ -30,7 +30,7 @@ def convert(
     streets : StreetFile
         Streets as written to ``source``.
     target : Path
-        Network to write (.net.xml).
+        Network to write (.net.xml), in the folder of the source.
     sumo : iterable of Path
         Folders to search for SUMO first.
 
@@ -50,14 +50,14 @@ def convert(
     ]
     types = ",".join(str(programs.home / "data" / "typemap" / name) for name in TYPE_FILES)
     options = ["--osm-files", source, "--output-file", first, "--type-files", types, *_layout(streets), *common]
-    yield from run(programs, programs.netconvert, options, "streets of the extract")
+    yield from run(programs, programs.netconvert, options, "streets of the extract", target.parent)
     # Lanes move to their places in a second run, with the junctions of the first: which nodes netconvert joins to one
     # junction depends on the shapes of the edges between them.
     moved = _moved_edges(read_network(first), streets.ways)
     lines.write_text("\n".join(["<edges>", *moved, "</edges>", ""]), encoding="utf-8")
     options = ["--sumo-net-file", first, "--edge-files", lines, "--output-file", target, "--precision", PRECISION]
     options += [*common, "--crossings.guess", "--junctions.corner-detail", 5]
-    yield from run(programs, programs.netconvert, options, "lanes of the extract")
+    yield from run(programs, programs.netconvert, options, "lanes of the extract", target.parent)
     first.unlink()
     lines.unlink()
     # The first comment holds the time of the run and the paths of its files. With it the same streets would give

@@ -1,5 +1,6 @@
 """Traffic from SUMO (Simulation of Urban MObility, Eclipse) on a map; SUMO itself is an optional extra."""
 
+import shutil
 import tempfile
 from collections.abc import Generator, Iterable, Sequence
 from dataclasses import dataclass, replace
@@ -197,7 +198,7 @@ def run_sumo(programs: Sumo, files: TrafficFiles, seed: int, duration: float) ->
     Parameters
     ----------
     files : TrafficFiles
-        The network, the routes, and the floating car data to be written.
+        The network, the routes, and the floating car data to be written, in one folder.
 
     Raises
     ------
@@ -208,14 +209,16 @@ def run_sumo(programs: Sumo, files: TrafficFiles, seed: int, duration: float) ->
         programs,
         programs.sumo,
         [
-            *("--net-file", files.net, "--route-files", ",".join(map(str, files.routes)), "--fcd-output", files.path),
-            *("--seed", seed, "--end", duration, "--step-length", STEP_SECONDS, "--precision", 3),
+            *("--net-file", files.net, "--route-files", ",".join(path.name for path in files.routes)),
+            *("--fcd-output", files.path, "--seed", seed),
+            *("--end", duration, "--step-length", STEP_SECONDS, "--precision", 3),
             *("--device.fcd.period", SAMPLING_SECONDS, "--person-device.fcd.period", SAMPLING_SECONDS),
             *("--lanechange.duration", _LANE_CHANGE_SECONDS, "--time-to-teleport", -1),
             *("--collision.action", "warn", "--collision.check-junctions", "true", "--ignore-route-errors", "true"),
             *("--no-step-log", "true", "--no-warnings", "true", "--xml-validation", "never"),
         ],
         "simulating traffic",
+        files.path.parent,
     )
 
 
@@ -226,7 +229,8 @@ def _network(
 
     The network of an extract has crossings already; that of an OpenDRIVE map gets them here.
     """
-    plain, nodes = (network.with_name(name) for name in ("plain.net.xml", "shapes.nod.xml"))
+    folder = network.parent
+    plain, nodes = (folder / name for name in ("plain.net.xml", "shapes.nod.xml"))
     common: list[object] = [
         *("--offset.disable-normalization", "true", "--no-turnarounds", "true", "--xml-validation", "never"),
         *("--junctions.internal-link-detail", 20, "--no-warnings", "true", "--tls.default-type", "static"),
@@ -234,8 +238,8 @@ def _network(
     ]
     shapes: dict[str, Float] = {}
     if map_path.name.endswith(NETWORK_SUFFIX):
-        plain = map_path
-        whole = read_network(plain)
+        _copy(map_path, plain)
+        whole = read_network(map_path)
     else:
         common += ["--crossings.guess", "true", "--crossings.guess.speed-threshold", 0]
         yield from _import_opendrive(programs, map_path, plain, common)
@@ -244,35 +248,44 @@ def _network(
     if bounds is not None:
         if not _reaches_into(whole, bounds):
             raise SeipError(f"{map_path.name} has no road at this site: name the map that the site was built from")
-        cut = network.with_name("cut.net.xml")
+        cut = folder / "cut.net.xml"
         clip = [
             "--keep-edges.in-boundary=" + ",".join(f"{edge:.3f}" for edge in bounds),
             "--keep-edges.postload",
             "true",
         ]
         source = ["--sumo-net-file", plain, "--tls.rebuild", "true", "--output-file", cut]
-        yield from run(programs, programs.netconvert, [*source, *common, *clip], "cutting the map")
+        yield from run(programs, programs.netconvert, [*source, *common, *clip], "cutting the map", folder)
         complete = _complete_junctions(whole, read_network(cut))
         shapes = {node: shape for node, shape in shapes.items() if node in complete}
         plain = cut
     corners = {node: " ".join(f"{x:.2f},{y:.2f}" for x, y in shape) for node, shape in shapes.items()}
     _write(nodes, "nodes", [f'<node id="{node}" shape="{shape}"/>' for node, shape in corners.items()])
     source = ["--sumo-net-file", plain, "--node-files", nodes, "--tls.rebuild", "true", "--output-file", network]
-    yield from run(programs, programs.netconvert, [*source, *common], "laying crosswalks")
+    yield from run(programs, programs.netconvert, [*source, *common], "laying crosswalks", folder)
 
 
 def _import_opendrive(
     programs: Sumo, map_path: Path, plain: Path, common: Sequence[object]
 ) -> Generator[Progress, None, None]:
     """Convert an OpenDRIVE map to a network."""
-    types = plain.with_name("lanes.typ.xml")
+    types, source = plain.with_name("lanes.typ.xml"), plain.with_name("map.xodr")
+    _copy(map_path, source)
     allowed = _LANES | {"none": 'disallow="all"'}
     _write(types, "types", [f'<type id="{lane}" speed="13.89" {who}/>' for lane, who in allowed.items()])
     # netconvert closes lanes below a least width, such as the two halves of one lane for both directions.
     narrow = ["--opendrive.min-width", MIN_LANE_WIDTH, "--opendrive.import-all-lanes", "true"]
     lanes = [*narrow, "--type-files", types, "--tls.guess", "true"]
-    source = ["--opendrive-files", map_path, *lanes, "--output-file", plain]
-    yield from run(programs, programs.netconvert, [*source, *common], "reading the map")
+    files = ["--opendrive-files", source, *lanes, "--output-file", plain]
+    yield from run(programs, programs.netconvert, [*files, *common], "reading the map", plain.parent)
+
+
+def _copy(map_path: Path, to: Path) -> None:
+    """Copy a map to where SUMO can read it, whatever its path."""
+    try:
+        shutil.copyfile(map_path, to)
+    except OSError as error:
+        raise SeipError(f"cannot read the map {map_path} ({error.strerror}); check its path") from error
 
 
 def _junction_shapes(network: StreetNetwork, road_map: RoadMap) -> dict[str, Float]:

@@ -2,6 +2,7 @@
 
 import dataclasses
 import re
+import tempfile
 
 import numpy as np
 import pytest
@@ -41,7 +42,7 @@ def opendrive(network, tmp_path):
     source.write_text(network, encoding="utf-8")
     programs = sumo_programs.find_sumo()
     options = ["--sumo-net-file", source, "--opendrive-output", target, "--output.street-names"]
-    finish(sumo_programs.run(programs, programs.netconvert, options, "map"))
+    finish(sumo_programs.run(programs, programs.netconvert, options, "map", tmp_path))
     return target
 
 
@@ -85,7 +86,9 @@ def test_the_region_follows_the_approaches_and_holds_both_carriageways(tmp_path)
     assert low_y < -80 < 80 < high_y
 
 
-def test_a_radius_is_a_circle_without_streets_that_only_pass_by(tmp_path):
+def test_a_radius_is_a_circle_without_streets_that_only_pass_by(tmp_path, monkeypatch):
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "a:b, c"))
+    (tmp_path / "a:b, c").mkdir()
     extract = crossing()
     extract.way([(-200, 45), (-10, 55), (200, 70)], highway="motorway", name="Passing")
     extract.way([(-60, -200), (-60, -70), (-40, -60), (200, -60)], highway="residential", name="Behind")

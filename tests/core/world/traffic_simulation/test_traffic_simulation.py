@@ -1,6 +1,7 @@
 """Traffic simulated on a map: the demand by hand, and SUMO itself where it is installed."""
 
 import os
+import shutil
 from collections import Counter
 from pathlib import Path
 from xml.etree import ElementTree as ET
@@ -106,8 +107,11 @@ def run(tmp_path_factory):
 
 
 @needs_sumo
-def test_the_same_seed_gives_the_same_traffic(tmp_path, run):
-    one, same = run, simulated(tmp_path / "same", JUNCTION)
+def test_the_same_seed_gives_the_same_traffic_in_folders_of_any_name(tmp_path, run):
+    own = tmp_path / "Leeds, UK" / "A: junction, 2.xodr"
+    own.parent.mkdir()
+    shutil.copyfile(JUNCTION, own)
+    one, same = run, simulated(tmp_path / "same: 1, 2", own)
     other = simulated(tmp_path / "other", JUNCTION, seed=4)
     assert rows(one.path) == rows(same.path)
     assert rows(one.path) != rows(other.path)
