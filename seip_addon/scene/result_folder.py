@@ -13,8 +13,8 @@ from ..core.base.errors import SeipError
 from ..core.base.progress import Progress
 from ..core.choosing.placement.deployment import Deployment
 from ..core.choosing.placement.objective import Solution, placement_constraints
-from ..core.output.pictures.colours import packed_counts
 from ..core.output.pictures.labelled_view import save_labelled_view
+from ..core.output.pictures.palette import packed_counts
 from ..core.output.pictures.plan_view import save_plan_view
 from ..core.output.results.file_names import REPORT_FILES
 from ..core.output.results.geographic_files import LOCATED_FILES, located, save_geojson, save_kml

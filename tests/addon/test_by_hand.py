@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from seip_addon.core.choosing.placement.objective import MOVED, MOVED_MESSAGE, Objective
-from seip_addon.core.output.pictures.colours import unpacked_counts
+from seip_addon.core.output.pictures.palette import unpacked_counts
 from seip_addon.core.output.results.answer import status_text
 from seip_addon.core.output.results.placement_record import comparable, load_placement, parsed_record
 from seip_addon.panel import coverage, following, placement, results, scene_status, sensors

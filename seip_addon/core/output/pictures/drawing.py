@@ -9,14 +9,17 @@ from functools import cache
 from typing import Any, Literal
 
 import numpy as np
+import shapely
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.font_manager import FontProperties, findfont, get_font
 from matplotlib.ft2font import FT2Font, LoadFlags
-from matplotlib.patches import Rectangle
+from matplotlib.patches import PathPatch, Rectangle
+from matplotlib.path import Path
 from PIL import Image
+from shapely.geometry.base import BaseGeometry
 
 from ...base.arrays import Boolean, Float
 from ...base.counts import counted, round_number
@@ -103,6 +106,15 @@ def box_corners(boxes: Float) -> Float:
 def draw_polygons(axes: Axes, polygons: Iterable[Float], **style: Any) -> None:  # noqa: ANN401 - matplotlib's own
     """Draw polygons by their corners, (k, 2) each; the limits of the axes stay."""
     axes.add_collection(PolyCollection(list(polygons), **style), autolim=False)
+
+
+def draw_area(axes: Axes, area: BaseGeometry, **style: Any) -> None:  # noqa: ANN401 - matplotlib's own
+    """Draw a polygon with its holes, or several."""
+    polygons = [part for part in shapely.get_parts(area) if part.geom_type == "Polygon" and not part.is_empty]
+    rings = [ring for part in polygons for ring in (part.exterior, *part.interiors)]
+    if rings:
+        path = Path.make_compound_path(*(Path(np.asarray(ring.coords)[:, :2], closed=True) for ring in rings))
+        axes.add_patch(PathPatch(path, **style))
 
 
 def window_around(bounds: Iterable[float], margin: float, shapes: tuple[float, float] = (0.0, np.inf)) -> Window:

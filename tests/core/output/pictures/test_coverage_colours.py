@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from seip_addon.core.output.pictures.colours import colouring
+from seip_addon.core.output.pictures.palette import colouring
 
 SEEN_BY = np.array([0, 1, 2, 3, 7, 0])
 WEIGHT = np.array([1.0, 1.0, 2.0, 4.0, 2.0, 1.0])

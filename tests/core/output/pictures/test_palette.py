@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from seip_addon.core.output.pictures.palette import INK, PAPER, RETURNS_COLOURS, SEEN_COLOURS, rgb
-from seip_addon.core.output.pictures.plan_map import LAND, PAVEMENT, ROAD
+from seip_addon.core.output.pictures.plan_view import LAND, PAVEMENT, ROAD
 
 GROUNDS = (LAND, PAVEMENT, ROAD)
 XYZ = np.array(

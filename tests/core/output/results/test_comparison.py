@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from seip_addon.core.output.pictures.colours import (
+from seip_addon.core.output.pictures.palette import (
     BOTH,
     KEPT_ONLY,
     NEITHER,
