@@ -186,10 +186,10 @@ def test_sites_are_ranked_by_gain_per_dollar_with_their_weight():
     failed, bare = (make_site(4 + at, draw, status=status) for at, status in enumerate(("failed", "without sensor")))
     record = network_of((failed, free, bare, *twins))
     ranked = ranked_sites(record)
-    assert [one.site for one in ranked] == [twins[1], twins[0], twins[2], free, bare, failed]
+    assert [site for site, _ in ranked] == [twins[1], twins[0], twins[2], free, bare, failed]
     mean = (2.0 + bare.weight + 1.0 + 4.0 + 1.0) / 5
-    assert [one.gain for one in ranked[:3]] == pytest.approx([0.1 / mean, 0.025 / mean, 0.025 / mean])
-    assert [one.rank for one in ranked] == [1, 2, 3, None, None, None]
+    assert [gain for _, gain in ranked[:3]] == pytest.approx([0.1 / mean, 0.025 / mean, 0.025 / mean])
+    assert [gain for _, gain in ranked[3:]] == [None, None, None]
     assert gain_text(record, 0.0251) == "2.51 points"
     assert gain_text(replace(record, criterion="returns"), math.log(1.25)) == "25.0%"
 
