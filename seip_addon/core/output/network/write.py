@@ -34,8 +34,7 @@ from ..pictures.drawing import (
 from ..pictures.palette import INK, PAPER, PAPER_STREETS, SHARE_COLOURS, SOFT_INK
 from ..report.blocks import Block, Bullets, Facts, Paragraph, Picture, Report, Table, make_sections
 from ..report.pdf import save_report
-from ..report.wording import date, dollars
-from ..results.answer import sentence
+from ..results.answer import date, dollars, sentence
 from ..results.geographic_files import DECIMALS, Feature, feature, save_features
 from .network_record import NetworkRecord, NetworkSite, gain_text, network_json, outcome, ranked_sites, sensors_text
 

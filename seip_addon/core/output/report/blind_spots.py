@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,14 +10,13 @@ import shapely
 from matplotlib.colors import ListedColormap
 
 from ...base.arrays import Boolean, Float, Integer
-from ...site.locations import DIRECTIONS, direction
+from ...site.locations import direction
 from ...site.targets import Targets
 from ..pictures.drawing import Style, add_axes, as_png, draw_callouts, draw_corners, new_page, window_around
 from ..pictures.palette import INK, PAPER, SEEN_COLOURS
 from ..results.placement_record import RecordedSensor
 from ..results.site_file import PLACE, WEIGHTED, Area
 
-ARMS = DIRECTIONS[::2]
 MIN_DISTANCE = 0.5  # metres from a centre from which on there is a direction from it
 DPI = 150
 MAP_WIDTH = 7.2  # inches
@@ -79,13 +77,10 @@ def seen_places(targets: Targets, seen_by: Integer, areas: Sequence[Area]) -> li
 def seen_streets(targets: Targets, seen_by: Integer, areas: Sequence[Area]) -> list[SeenPlace]:
     """Return what is seen of each part of the road, and of all of it at the end.
 
-    Each target belongs to one part: to the first weighted region that contains it, otherwise to the first street, or,
-    if no street is named, to the road towards one side. Areas and shares therefore add up. ``areas`` are weighted
-    regions and streets, without crossings.
+    Each target belongs to one part: to the first weighted region that contains it, otherwise to the first street.
+    Areas and shares therefore add up. ``areas`` are weighted regions and streets, without crossings.
     """
     streets = [(area.name, area.within) for area in areas if area.kind == PLACE]
-    if not streets:
-        streets = list(_arms(targets, centres(targets, areas)))
     weighted = [(f"{area.name} (weighted)", area.within) for area in areas if area.kind == WEIGHTED]
     left = np.ones(len(targets), dtype=bool)
     parts = []
@@ -113,36 +108,17 @@ def centres(targets: Targets, areas: Sequence[Area]) -> list[Centre]:
     ]
 
 
-def _arms(targets: Targets, origins: Sequence[Centre]) -> Iterator[tuple[str, Boolean]]:
-    """Yield the targets on each side of the nearest centre, without those in weighted regions."""
-    nearest, angle, _ = _from_nearest(origins, targets.xyz)
-    quarter = np.round(angle / (math.pi / 2)).astype(np.int64) % 4
-    for origin, centre in enumerate(origins):
-        for number, name in enumerate(ARMS):
-            within = (nearest == origin) & (quarter == number) & ~targets.central
-            yield f"Road {name} of the centre of {centre.name}", within
-
-
-def _from_nearest(origins: Sequence[Centre], points: Float) -> tuple[Integer, Float, Float]:
-    """Return index of, direction from (radians) and distance from (metres) the centre nearest to each point (n, 3)."""
-    offsets = points[:, None, :2] - np.array([centre.xy for centre in origins])
-    distances = np.hypot(*np.moveaxis(offsets, 2, 0))
-    nearest = distances.argmin(axis=1)
-    rows = np.arange(len(points))
-    x, y = offsets[rows, nearest].T
-    return nearest, np.arctan2(y, x), distances[rows, nearest]
-
-
 def _where(own: Integer, middle: Float, targets: Targets, areas: Sequence[Area]) -> str:
     """Return where a blind spot is: the area that holds most of it, and distance and direction from a centre.
 
     A page names the only centre before its list of blind spots.
     """
     origins = centres(targets, areas)
-    (nearest,), _, (distance,) = _from_nearest(origins, middle[None])
-    towards = direction(middle[:2] - origins[nearest].xy)
-    away = f"{distance:.0f} m {towards} of" if distance >= MIN_DISTANCE else "at"
-    words = f"{away} the centre" + (f" of {origins[nearest].name}" if len(origins) > 1 else "")
+    nearest = min(origins, key=lambda centre: float(np.hypot(*(middle[:2] - centre.xy))))
+    offset = middle[:2] - nearest.xy
+    distance = float(np.hypot(*offset))
+    away = f"{distance:.0f} m {direction(offset)} of" if distance >= MIN_DISTANCE else "at"
+    words = f"{away} the centre" + (f" of {nearest.name}" if len(origins) > 1 else "")
     shares = [(int(area.within[own].sum()), area.name) for area in areas]
     most, name = max(shares, key=lambda one: one[0], default=(0, ""))
     if 2 * most < len(own):

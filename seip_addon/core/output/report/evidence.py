@@ -21,7 +21,7 @@ from ..results.file_names import (
     VERIFICATION_FOLDER,
     VERIFICATION_PICTURE,
 )
-from ..results.placement_record import PlacementRecord, RecordedSensor, load_placement
+from ..results.placement_record import PlacementRecord, load_placement
 from ..results.site_file import SiteFile, load_site_file
 from ..results.verification_record import VerificationRecord, load_verification
 from .blind_spots import Centre, centres
@@ -49,15 +49,9 @@ class Evidence:
     verification: VerificationRecord | None = None
 
     @property
-    def sensors(self) -> tuple[RecordedSensor, ...]:
-        """The sensors, in the order of the rows of `SiteFile.seen`."""
-        return self.record.sensors
-
-    @property
     def seen_by(self) -> Integer:
         """Number of sensors that see each target, (t,) int64."""
-        times: Integer = self.site.seen.sum(axis=0, dtype=np.int64)
-        return times
+        return np.asarray(self.site.seen.sum(axis=0, dtype=np.int64))
 
     @property
     def seen(self) -> Boolean:
@@ -102,9 +96,9 @@ def load_evidence(folder: Path) -> Evidence:
     names += [TRAFFIC_PICTURE] if record.request.goal.scenarios.kind == "traffic" else []
     pictures = {name: _picture(folder / name) for name in names if (folder / name).is_file()}
     verification = _verification(folder / VERIFICATION_FOLDER, record)
-    if verification is not None:
-        path = folder / VERIFICATION_FOLDER / VERIFICATION_PICTURE
-        pictures |= {path.name: _picture(path, "verify the installation again")} if path.is_file() else {}
+    path = folder / VERIFICATION_FOLDER / VERIFICATION_PICTURE
+    if verification is not None and path.is_file():
+        pictures[path.name] = _picture(path, "verify the installation again")
     return Evidence(record, site, pictures, verification)
 
 

@@ -18,8 +18,7 @@ from PIL import Image
 from ...storage.files import whole_file
 from ..pictures.palette import INK, SOFT_INK
 from ..results.file_names import REPORT_FILES
-from .blocks import Block, Bullets, Card, Facts, Paragraph, Picture, Report, Section, Table
-from .html import as_html
+from .blocks import Block, Bullets, Card, Facts, Paragraph, Picture, Report, Section, Table, as_html
 
 MARGIN, TOP, BOTTOM = 50.0, 52.0, 56.0
 BODY, SMALL, CARD_TITLE, LARGE, HEADING, TITLE = 9.5, 8.0, 10.5, 10.5, 14.0, 20.0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections import Counter
 from collections.abc import Generator, Iterator, Mapping, Sequence
 from pathlib import Path
@@ -13,7 +14,7 @@ from ...base.arrays import Boolean, Float
 from ...base.counts import counted
 from ...base.progress import Progress
 from ...choosing.placement.deployment import BAND, UNRANKED
-from ...choosing.placement.objective import CHOSEN_FOR, MOVED, SAME_PRICE, purpose
+from ...choosing.placement.objective import CHOSEN_FOR, MOVED, MOVED_MESSAGE, Objective, purpose
 from ...choosing.placement.returns_summary import (
     FEW,
     FEW_RETURNS,
@@ -21,9 +22,10 @@ from ...choosing.placement.returns_summary import (
     SURFACE_SEEN,
     returns_text,
 )
+from ...sensing.lidar.catalogue import load_catalogue
 from ...site.candidates import PAPER_TYPES
 from ..pictures.drawing import percent
-from ..results.answer import Costs, costs_of, sentence
+from ..results.answer import Costs, costs_of, date, dollars, possible_improvement, sentence
 from ..results.file_names import POSE_ERROR_PICTURES, TRAFFIC_PICTURE
 from ..results.geographic_files import LOCATED_FILES
 from ..results.placement_record import RecordedSensor, relevant_warnings
@@ -54,22 +56,9 @@ from .blocks import (
 )
 from .evidence import Evidence, load_evidence
 from .pdf import save_report
-from .wording import (
-    date,
-    dollars,
-    in_sentence,
-    limits_of,
-    mounting,
-    named,
-    plain_warning,
-    points,
-    proof,
-    returns_within,
-)
 
 MOST_SPOTS = 8
 LEAST_TILT = 0.05  # degrees, below which a sensor is upright
-MIN_DIFFERENCE = 1e-6  # share of the road by which two coverages differ at least; records have nine digits
 FOR_RETURNS = " for returns from road users"
 POSE_ERRORS = "with errors of"
 """Beginning of the note on the cost of pose errors."""
@@ -180,9 +169,10 @@ def _summary(evidence: Evidence) -> str:
         )
     least = min(record.crossings, key=lambda one: one.least, default=None)
     if least is not None:
+        name = f"c{least.name[1:]}" if least.name.startswith("Crossing") else least.name  # within a sentence
         parts.append(
             f"A pedestrian in plain view on a crossing returns at least {returns_text(least.least)} points in each "
-            f"revolution (at the worst point of the {in_sentence(least.name)})."
+            f"revolution (at the worst point of the {name})."
         )
     if len(record.sensors) > 1:
         least_left = percent(min(after_failures(evidence.site.seen)))
@@ -219,7 +209,7 @@ def _verification(evidence: Evidence) -> Iterator[Block]:
         f"{percent(steps.returned)} of the squares have a measured point nearby in most turns of the sensors."
         f"{'' if abs(steps.promised - planned) < LEAST_COST else differs}"
     )
-    missing = [sensor.id for sensor in evidence.sensors if sensor.id not in {one.id for one in found.sensors}]
+    missing = [sensor.id for sensor in evidence.record.sensors if sensor.id not in {one.id for one in found.sensors}]
     if missing:
         yield Paragraph(f"The recording does not contain {', '.join(missing)}: the coverage above is without.")
     for one in found.sensors:
@@ -271,14 +261,14 @@ def _sensors(evidence: Evidence, costs: Costs) -> Iterator[Block]:
         f"Heights and coordinates are those of the optical centre. {system} Before work begins, check ownership, "
         "foundations, power and underground lines on site."
     )
-    for sensor, items in zip(evidence.sensors, costs.items, strict=True):
+    for sensor, items in zip(evidence.record.sensors, costs.items, strict=True):
         yield Card(f"{sensor.id}  {sensor.sensor_name}", (Facts(tuple(_sensor_facts(evidence, sensor, items))),))
 
 
 def _sensor_facts(evidence: Evidence, sensor: RecordedSensor, items: Mapping[str, float]) -> Iterator[tuple[str, str]]:
     if sensor.location:
         yield "Location", sensor.location
-    yield "Mounted on", mounting(sensor)
+    yield "Mounted on", _mounting(sensor)
     tilted = abs(sensor.tilt_deg) >= LEAST_TILT
     tilt = f"tilted by {sensor.tilt_deg:.1f}° downwards at the front" if tilted else "upright (tilt 0°)"
     yield "Height, tilt", f"{sensor.height_m:.2f} m above the ground, {tilt}"
@@ -295,7 +285,7 @@ def _sensor_facts(evidence: Evidence, sensor: RecordedSensor, items: Mapping[str
         yield "Altitude", f"{sensor.altitude_m:.1f} m"
     parts = ", ".join(f"{name} {dollars(amount)}" for name, amount in items.items())
     yield "Cost", f"{dollars(sum(items.values()))}: {parts}"
-    alone = f"; {percent(sensor.coverage_marginal)} is seen by no other" if len(evidence.sensors) > 1 else ""
+    alone = f"; {percent(sensor.coverage_marginal)} is seen by no other" if len(evidence.record.sensors) > 1 else ""
     yield "Sees", f"{percent(sensor.coverage_alone)} of the road{alone}"
 
 
@@ -347,7 +337,7 @@ def _blind_spots(evidence: Evidence) -> Iterator[Block]:
         yield Paragraph(SURFACE_SEEN)
     yield Picture(
         blind_spot_map(
-            evidence.site.targets, evidence.seen_by, shown, evidence.sensors, evidence.record.site.attribution
+            evidence.site.targets, evidence.seen_by, shown, evidence.record.sensors, evidence.record.site.attribution
         ),
         "Orange is not seen, light blue seen by one sensor, dark blue by two or more. Triangles are sensors, numbers "
         "the blind spots of the table.",
@@ -386,10 +376,8 @@ def _located(evidence: Evidence, points: Float, digits: int = 6) -> list[str]:
 def _other_choices(evidence: Evidence) -> Iterator[Block]:
     record = evidence.record
     yield Paragraph(proof(evidence))
-    same_price = _same_price(evidence)
-    elsewhere = (POSE_ERRORS, CHOSEN_FOR, BAND, UNRANKED, FEW, *LOCATED_FILES, *([SAME_PRICE] if same_price else []))
+    elsewhere = (POSE_ERRORS, CHOSEN_FOR, BAND, UNRANKED, FEW, *LOCATED_FILES)
     notes = [sentence(note.partition(": the gap is")[0]) for note in record.notes if not note.startswith(elsewhere)]
-    notes += [same_price] if same_price else []
     notes += [] if record.judgement is None else record.judgement.sentences()
     if record.returns is not None and record.judgement is None:
         notes.append(sentence(NOT_BY_DETECTION))
@@ -397,27 +385,6 @@ def _other_choices(evidence: Evidence) -> Iterator[Block]:
     yield Bullets(tuple(notes))
     if len(record.front if record.returns is None else record.returns.front) > 1:
         yield from _front(evidence)
-
-
-def _same_price(evidence: Evidence) -> str:
-    """Return what is proven of the coverage of the cheapest placement, from the table of numbers of sensors, or ""."""
-    record, problem = evidence.record, evidence.site.problem
-    own = [point for point in record.front if point.count == len(record.sensors)]
-    equal = bool(np.ptp(problem.prices[problem.allowed]) == 0) if problem.allowed.any() else False
-    if not record.objective.cheapest or record.objective.status == MOVED or not own or not equal:
-        return ""
-    choice = f"choice of {counted(len(record.sensors), 'sensor')}, at the same price,"
-    more = own[0].coverage - _weighted_share(evidence)
-    if more > MIN_DIFFERENCE:
-        return f"Another {choice} covers {points(more)} more: see the table of numbers of sensors."
-    missed = own[0].missed
-    return f"No other {choice} covers more{f' than {points(missed)} more' if missed else ': this is proven'}."
-
-
-def _weighted_share(evidence: Evidence) -> float:
-    """Return the share of the road that is seen, counted by its weights."""
-    weights = evidence.site.problem.weights
-    return math.fsum(weights[evidence.seen]) / math.fsum(weights)
 
 
 def _front(evidence: Evidence) -> Iterator[Block]:
@@ -429,7 +396,7 @@ def _front(evidence: Evidence) -> Iterator[Block]:
         rows = [
             (
                 *(point.count, point.price, percent(point.coverage)),
-                f"at most {points(point.missed)} more" if point.missed else "none sees more",
+                f"at most {_points(point.missed)} more" if point.missed else "none sees more",
             )
             for point in record.front
         ]
@@ -498,10 +465,10 @@ def _trust(evidence: Evidence) -> Iterator[Block]:
         lines.append(f"Types 1 to 3 {PAPER_MODELS} This placement uses {' and '.join(models)}.")
     evidences = {sensor.sensor_name: sensor.evidence for sensor in record.sensors if sensor.sensor not in PAPER_TYPES}
     lines += [f"Range of {name}: {rests_on}." for name, rests_on in evidences.items() if rests_on]
-    lines += [named(sentence(note)) for note in record.notes if note.startswith((BAND, UNRANKED))]
+    lines += [_named(sentence(note)) for note in record.notes if note.startswith((BAND, UNRANKED))]
     chosen = (sensor.sensor for sensor in record.sensors)
     warnings = relevant_warnings(record.warnings, record.request.candidates.sensors, chosen)
-    lines += [plain_warning(warning, names) for warning in warnings]
+    lines += [_plain_warning(warning, names) for warning in warnings]
     lines.append("The scene is a model: objects that it lacks do not block the view. Check the positions on site.")
     yield Bullets(tuple(lines))
 
@@ -540,10 +507,10 @@ def _settings(evidence: Evidence) -> Iterator[tuple[str, str]]:
     record = evidence.record
     goal, counts, targets = record.request.goal, record.counts, evidence.site.targets
     if goal.coverage is not None:
-        asked = f"the cheapest sensors that see {percent(goal.coverage)} of the road{limits_of(goal, 'with')}"
+        asked = f"the cheapest sensors that see {percent(goal.coverage)} of the road{_limits_of(goal, 'with')}"
     else:
         what = "most of the road seen" if record.returns is None else "most points on road users"
-        asked = f"{what}{limits_of(goal, 'with')}"
+        asked = f"{what}{_limits_of(goal, 'with')}"
     chosen_for = purpose(record.notes)
     chosen_for = "" if record.returns is not None and chosen_for == FOR_RETURNS else chosen_for
     yield "Asked for", f"{asked}{f', chosen{chosen_for}' if chosen_for else ''}"
@@ -562,3 +529,74 @@ def _settings(evidence: Evidence) -> Iterator[tuple[str, str]]:
     yield "With", ", ".join(f"{name} {version}" for name, version in record.versions.items())
     for name, value in record.inputs.items():
         yield f"Checksum of {name}", value
+
+
+def proof(evidence: Evidence) -> str:
+    """Return what is proven of a placement among the same positions, without terms of optimisation."""
+    record = evidence.record
+    found = record.objective
+    if found.status == MOVED:
+        return MOVED_MESSAGE
+    limits = _limits_of(record.request.goal, "of")
+    choice = f"choice{limits} among the {record.counts.positions:,} positions, under the same rules,"
+    if found.bound is None:
+        return f"Another {choice} may be better; how much better is not known."
+    proven = "this is proven" if found.status == "optimal" else "this bound is proven"
+    return f"No other {choice} {_better(evidence, found.bound)}: {proven}."
+
+
+def _limits_of(goal: Objective, joint: str) -> str:
+    """Return the limits on a placement, its number of sensors after a word and its price, as the end of a sentence."""
+    count = "" if goal.count is None else f" {joint} at most {counted(goal.count, 'sensor')}"
+    return count if goal.budget is None else f"{count} for at most {dollars(goal.budget)}"
+
+
+def _better(evidence: Evidence, bound: float) -> str:
+    """Return what no other choice does, as the predicate of a sentence."""
+    record, found = evidence.record, evidence.record.objective
+    returns, optimal = record.returns, found.status == "optimal"
+    if any(note.startswith(CHOSEN_FOR) for note in record.notes):
+        more = possible_improvement(record) or 0.0
+        if optimal:
+            return "does better"
+        if returns is not None and math.isclose(math.expm1(found.value), returns.typical, rel_tol=1e-3):
+            return f"has more than {returns_within(returns.typical, more)} points on a typical road user"
+        return f"is better by more than {math.ceil(more * 1000 - 1e-9) / 10:.1f}%"
+    if found.cheapest:
+        saved = f"is more than {dollars(max(0.0, found.value - bound))} cheaper"
+        return "reaches the required coverage at a lower price" if optimal else saved
+    more = max(0.0, bound - found.value) / math.fsum(evidence.site.problem.weights)
+    what = "of the road" if found.kind == "vanilla" else "of the road, counted by its weights"
+    return f"covers more {what}" if optimal else f"covers more than {_points(more)} more {what}"
+
+
+def _points(share: float) -> str:
+    """Return a share as percentage points, rounded up."""
+    return f"{math.ceil(share * 1000 - 1e-9) / 10:.1f} percentage points"
+
+
+def returns_within(returns: float, gap: float) -> str:
+    """Return a bound on returns as text, rounded up; the gap is the largest share by which 1 + returns can grow."""
+    most = (1.0 + returns) * (1.0 + gap) - 1.0
+    return f"{math.ceil(most - 1e-9):,}" if most >= 10 else f"{math.ceil(10 * most - 1e-9) / 10:.1f}"
+
+
+def _named(text: str) -> str:
+    """Return a text with the names of sensor types in place of their catalogue keys."""
+    catalogue = load_catalogue()
+    return re.sub(r"\w+", lambda word: catalogue[word[0]].name if word[0] in catalogue else word[0], text)
+
+
+def _mounting(sensor: RecordedSensor) -> str:
+    """Return what a sensor is mounted on."""
+    if sensor.pose is None:
+        return "moved by hand: check on site"
+    return f"existing pole ({sensor.position})" if sensor.on_pole else f"new post ({sensor.position})"
+
+
+def _plain_warning(warning: str, names: Mapping[str, str]) -> str:
+    """Return a warning about a sensor type in plain words, with its name in place of its catalogue key."""
+    key, _, rest = warning.partition(": ")
+    if key not in names:
+        return sentence(warning)
+    return sentence(f"{names[key]}: {rest}")

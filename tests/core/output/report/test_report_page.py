@@ -13,11 +13,9 @@ from seip_addon.core.base.errors import SeipError
 from seip_addon.core.base.progress import finish
 from seip_addon.core.choosing.placement.objective import MOVED, FrontPoint, Objective
 from seip_addon.core.choosing.placement.returns_summary import ReturnsPoint, ReturnsSummary
-from seip_addon.core.output.report.blocks import Card, Facts, Paragraph, Picture, Table
+from seip_addon.core.output.report.blocks import Card, Facts, Paragraph, Picture, Table, as_html
 from seip_addon.core.output.report.evidence import load_evidence
-from seip_addon.core.output.report.html import as_html
-from seip_addon.core.output.report.sections import make_report, write_report
-from seip_addon.core.output.report.wording import proof, returns_within
+from seip_addon.core.output.report.sections import make_report, proof, returns_within, write_report
 from seip_addon.core.output.results.answer import costs_of
 from seip_addon.core.output.results.file_names import REPORT_FILES
 from seip_addon.core.site.installed_cost import load_installed_cost

@@ -6,9 +6,8 @@ from html import unescape
 import pytest
 
 from seip_addon.core.base.errors import SeipError
-from seip_addon.core.output.report.blocks import Picture, Table
+from seip_addon.core.output.report.blocks import Picture, Table, as_html
 from seip_addon.core.output.report.evidence import load_evidence
-from seip_addon.core.output.report.html import as_html
 from seip_addon.core.output.report.pdf import as_pdf
 from seip_addon.core.output.report.sections import make_report
 from tests.builders.report_folder import make_folder
