@@ -110,8 +110,8 @@ def _features(record: NetworkRecord) -> Iterator[Feature]:
         for sensor in site.sensors:
             place = [_within_a_turn(sensor.longitude), round(sensor.latitude, DECIMALS)]
             about = {"id": sensor.id, "site": site.name, "folder": site.folder, "sensor": sensor.sensor}
-            about |= {"position": sensor.position, "height_m": round(sensor.height_m, 3)}
-            yield feature("sensor", "Point", place, **about, price_usd=round(sensor.price_usd, 2))
+            numbers = {"height_m": round(sensor.height_m, 3), "price_usd": round(sensor.price_usd, 2)}
+            yield feature("sensor", "Point", place, **about, position=sensor.position, **numbers)
 
 
 def _rows(record: NetworkRecord) -> Iterator[tuple[NetworkSite, dict[str, object]]]:

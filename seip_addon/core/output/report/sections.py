@@ -14,7 +14,7 @@ from ...base.arrays import Boolean, Float
 from ...base.counts import counted
 from ...base.progress import Progress
 from ...choosing.placement.deployment import BAND, UNRANKED
-from ...choosing.placement.objective import CHOSEN_FOR, MOVED, MOVED_MESSAGE, Objective, purpose
+from ...choosing.placement.objective import CHOSEN_FOR, Objective, purpose
 from ...choosing.placement.returns_summary import (
     FEW,
     FEW_RETURNS,
@@ -25,7 +25,7 @@ from ...choosing.placement.returns_summary import (
 from ...sensing.lidar.catalogue import load_catalogue
 from ...site.candidates import PAPER_TYPES
 from ..pictures.drawing import percent
-from ..results.answer import Costs, costs_of, date, dollars, possible_improvement, sentence
+from ..results.answer import Costs, costs_of, date, dollars, outlook, sentence
 from ..results.file_names import POSE_ERROR_PICTURES, TRAFFIC_PICTURE
 from ..results.geographic_files import LOCATED_FILES
 from ..results.placement_record import RecordedSensor, relevant_warnings
@@ -34,12 +34,10 @@ from ..results.verification_record import (
     RecordedChange,
     change_text,
     cost_text,
-    coverage_rows,
     coverage_text,
     gain_text,
     objects,
     pose_text,
-    signed_points,
     vehicles,
 )
 from .blind_spots import blind_spot_map, blind_spots, seen_places, seen_streets
@@ -177,7 +175,7 @@ def _summary(evidence: Evidence) -> str:
     if len(record.sensors) > 1:
         least_left = percent(min(after_failures(evidence.site.seen)))
         parts.append(f"If any one sensor fails, at least {least_left} of the road is still seen.")
-    return " ".join([*parts, proof(evidence)])
+    return " ".join([*parts, outlook(record)])
 
 
 def _plan(evidence: Evidence) -> Iterator[Block]:
@@ -194,19 +192,11 @@ def _verification(evidence: Evidence) -> Iterator[Block]:
         f"The recording “{found.recording}” of the installed sensors was compared with the plan, beam by beam. "
         f"{coverage_text(steps)}"
     )
-    yield Table(
-        ("Coverage", "Seen", "Difference, points"),
-        tuple(
-            (cause[:1].upper() + cause[1:], percent(share), "" if effect is None else signed_points(effect))
-            for cause, share, effect in coverage_rows(steps)
-        ),
-        frozenset({1, 2}),
-    )
     planned = evidence.record.coverage.whole
     differs = f" Settings other than those of the placement, which promised {percent(planned)}, were used."
     yield Paragraph(
-        "Each row includes those above it, and all are computed on the same squares of road. In the recording itself, "
-        f"{percent(steps.returned)} of the squares have a measured point nearby in most turns of the sensors."
+        "Each effect is on top of those before it, and all are computed on the same squares of road. In the recording "
+        f"itself, {percent(steps.returned)} of the squares have a measured point nearby in most turns of the sensors."
         f"{'' if abs(steps.promised - planned) < LEAST_COST else differs}"
     )
     missing = [sensor.id for sensor in evidence.record.sensors if sensor.id not in {one.id for one in found.sensors}]
@@ -301,11 +291,7 @@ def _costs(costs: Costs) -> Iterator[Block]:
 
 
 def _places(evidence: Evidence) -> Iterator[Block]:
-    record, coverage = evidence.record, evidence.record.coverage
-    yield Paragraph(
-        f"{percent(coverage.whole)} of the road is seen by a sensor, {percent(coverage.seen_twice)} by two or more."
-    )
-    site, returns = evidence.site, {one.name: one.least for one in record.crossings}
+    site, returns = evidence.site, {one.name: one.least for one in evidence.record.crossings}
     parts = seen_streets(site.targets, evidence.seen_by, [one for one in site.areas if one.name not in returns])
     streets = ((one.name, f"{one.area:,.0f}", percent(one.seen), percent(one.seen_twice)) for one in parts)
     yield Table(("Part of the road", "Area, m²", "Seen", "Twice"), tuple(streets), frozenset({1, 2, 3}))
@@ -375,13 +361,13 @@ def _located(evidence: Evidence, points: Float, digits: int = 6) -> list[str]:
 
 def _other_choices(evidence: Evidence) -> Iterator[Block]:
     record = evidence.record
-    yield Paragraph(proof(evidence))
+    yield Paragraph(outlook(record))
     elsewhere = (POSE_ERRORS, CHOSEN_FOR, BAND, UNRANKED, FEW, *LOCATED_FILES)
     notes = [sentence(note.partition(": the gap is")[0]) for note in record.notes if not note.startswith(elsewhere)]
     notes += [] if record.judgement is None else record.judgement.sentences()
     if record.returns is not None and record.judgement is None:
         notes.append(sentence(NOT_BY_DETECTION))
-    notes.append("“Proven” refers to the model: this scene, these sensor models and this criterion.")
+    notes.append("What is proven of other choices refers to the model: this scene, these sensor models and this criterion.")
     yield Bullets(tuple(notes))
     if len(record.front if record.returns is None else record.returns.front) > 1:
         yield from _front(evidence)
@@ -391,7 +377,7 @@ def _front(evidence: Evidence) -> Iterator[Block]:
     """Yield the table of the best placements by number of sensors."""
     record, returns, budget = evidence.record, evidence.record.returns, evidence.record.request.goal.budget
     if returns is None:
-        weighted = ", by its weights" if np.ptp(evidence.site.problem.weights) > 0 else ""
+        weighted = ", by its weights" if np.ptp(evidence.site.weights) > 0 else ""
         measured, head = f"see these shares of the road{weighted}.", "Seen"
         rows = [
             (
@@ -465,10 +451,10 @@ def _trust(evidence: Evidence) -> Iterator[Block]:
         lines.append(f"Types 1 to 3 {PAPER_MODELS} This placement uses {' and '.join(models)}.")
     evidences = {sensor.sensor_name: sensor.evidence for sensor in record.sensors if sensor.sensor not in PAPER_TYPES}
     lines += [f"Range of {name}: {rests_on}." for name, rests_on in evidences.items() if rests_on]
-    lines += [_named(sentence(note)) for note in record.notes if note.startswith((BAND, UNRANKED))]
+    lines += [_named(note, names) for note in record.notes if note.startswith((BAND, UNRANKED))]
     chosen = (sensor.sensor for sensor in record.sensors)
     warnings = relevant_warnings(record.warnings, record.request.candidates.sensors, chosen)
-    lines += [_plain_warning(warning, names) for warning in warnings]
+    lines += [_named(warning, names) for warning in warnings]
     lines.append("The scene is a model: objects that it lacks do not block the view. Check the positions on site.")
     yield Bullets(tuple(lines))
 
@@ -507,10 +493,10 @@ def _settings(evidence: Evidence) -> Iterator[tuple[str, str]]:
     record = evidence.record
     goal, counts, targets = record.request.goal, record.counts, evidence.site.targets
     if goal.coverage is not None:
-        asked = f"the cheapest sensors that see {percent(goal.coverage)} of the road{_limits_of(goal, 'with')}"
+        asked = f"the cheapest sensors that see {percent(goal.coverage)} of the road{_limits_of(goal)}"
     else:
         what = "most of the road seen" if record.returns is None else "most points on road users"
-        asked = f"{what}{_limits_of(goal, 'with')}"
+        asked = f"{what}{_limits_of(goal)}"
     chosen_for = purpose(record.notes)
     chosen_for = "" if record.returns is not None and chosen_for == FOR_RETURNS else chosen_for
     yield "Asked for", f"{asked}{f', chosen{chosen_for}' if chosen_for else ''}"
@@ -531,43 +517,10 @@ def _settings(evidence: Evidence) -> Iterator[tuple[str, str]]:
         yield f"Checksum of {name}", value
 
 
-def proof(evidence: Evidence) -> str:
-    """Return what is proven of a placement among the same positions, without terms of optimisation."""
-    record = evidence.record
-    found = record.objective
-    if found.status == MOVED:
-        return MOVED_MESSAGE
-    limits = _limits_of(record.request.goal, "of")
-    choice = f"choice{limits} among the {record.counts.positions:,} positions, under the same rules,"
-    if found.bound is None:
-        return f"Another {choice} may be better; how much better is not known."
-    proven = "this is proven" if found.status == "optimal" else "this bound is proven"
-    return f"No other {choice} {_better(evidence, found.bound)}: {proven}."
-
-
-def _limits_of(goal: Objective, joint: str) -> str:
-    """Return the limits on a placement, its number of sensors after a word and its price, as the end of a sentence."""
-    count = "" if goal.count is None else f" {joint} at most {counted(goal.count, 'sensor')}"
+def _limits_of(goal: Objective) -> str:
+    """Return the limits on a placement, its number of sensors and its price, as the end of a sentence."""
+    count = "" if goal.count is None else f" with at most {counted(goal.count, 'sensor')}"
     return count if goal.budget is None else f"{count} for at most {dollars(goal.budget)}"
-
-
-def _better(evidence: Evidence, bound: float) -> str:
-    """Return what no other choice does, as the predicate of a sentence."""
-    record, found = evidence.record, evidence.record.objective
-    returns, optimal = record.returns, found.status == "optimal"
-    if any(note.startswith(CHOSEN_FOR) for note in record.notes):
-        more = possible_improvement(record) or 0.0
-        if optimal:
-            return "does better"
-        if returns is not None and math.isclose(math.expm1(found.value), returns.typical, rel_tol=1e-3):
-            return f"has more than {returns_within(returns.typical, more)} points on a typical road user"
-        return f"is better by more than {math.ceil(more * 1000 - 1e-9) / 10:.1f}%"
-    if found.cheapest:
-        saved = f"is more than {dollars(max(0.0, found.value - bound))} cheaper"
-        return "reaches the required coverage at a lower price" if optimal else saved
-    more = max(0.0, bound - found.value) / math.fsum(evidence.site.problem.weights)
-    what = "of the road" if found.kind == "vanilla" else "of the road, counted by its weights"
-    return f"covers more {what}" if optimal else f"covers more than {_points(more)} more {what}"
 
 
 def _points(share: float) -> str:
@@ -581,10 +534,10 @@ def returns_within(returns: float, gap: float) -> str:
     return f"{math.ceil(most - 1e-9):,}" if most >= 10 else f"{math.ceil(10 * most - 1e-9) / 10:.1f}"
 
 
-def _named(text: str) -> str:
-    """Return a text with the names of sensor types in place of their catalogue keys."""
-    catalogue = load_catalogue()
-    return re.sub(r"\w+", lambda word: catalogue[word[0]].name if word[0] in catalogue else word[0], text)
+def _named(note: str, names: Mapping[str, str]) -> str:
+    """Return a note as a sentence with the names of sensor types in place of their catalogue keys."""
+    known = {**{key: model.name for key, model in load_catalogue().items()}, **names}
+    return re.sub(r"\w+", lambda word: known.get(word[0], word[0]), sentence(note))
 
 
 def _mounting(sensor: RecordedSensor) -> str:
@@ -592,11 +545,3 @@ def _mounting(sensor: RecordedSensor) -> str:
     if sensor.pose is None:
         return "moved by hand: check on site"
     return f"existing pole ({sensor.position})" if sensor.on_pole else f"new post ({sensor.position})"
-
-
-def _plain_warning(warning: str, names: Mapping[str, str]) -> str:
-    """Return a warning about a sensor type in plain words, with its name in place of its catalogue key."""
-    key, _, rest = warning.partition(": ")
-    if key not in names:
-        return sentence(warning)
-    return sentence(f"{names[key]}: {rest}")

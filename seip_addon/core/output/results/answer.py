@@ -61,9 +61,27 @@ def answer(record: PlacementRecord) -> tuple[str, ...]:
         achieved = " ".join(filter(None, (record.returns.verdict(), typical)))
     paid = f"{dollars(record.price_usd)} for {counted(len(record.sensors), 'sensor')}"
     installed = " with installation" if record.installed else f", about {dollars(costs_of(record).total)} installed"
-    lines = [f"{achieved} {_outlook(record)}", f"{paid}{installed}."]
+    lines = [f"{achieved} {outlook(record)}", f"{paid}{installed}."]
     judged = () if record.judgement is None else record.judgement.sentences()
     return tuple(filter(None, (*lines, *judged, recommendation(record))))
+
+
+def outlook(record: PlacementRecord) -> str:
+    """Return how much better the best placement of these candidates could be."""
+    objective = record.objective
+    if objective.status == MOVED:
+        return "This is not an optimised placement: the sensors are evaluated where they stand."
+    what = purpose(record.notes) if record.returns is None else ""  # else the sentence before has said it
+    what += "" if record.judgement is None else " by the criterion"
+    better = "cheaper" if objective.cheapest else "better"
+    if objective.status == "optimal":
+        return f"No placement of these candidates is {better}{what}."
+    more = possible_improvement(record)
+    return (
+        "How much better it could be is not known."
+        if more is None
+        else f"At most {more:.1%} {better} is possible{what}."
+    )
 
 
 def recommendation(record: PlacementRecord) -> str:
@@ -119,24 +137,6 @@ def _quality(record: PlacementRecord, *, exact: bool = False) -> str:
     if record.returns is not None:
         return f"{returns_text(record.returns.typical)} returns"
     return f"{record.coverage.whole:.2%}" if exact else f"{record.coverage.whole:.0%}"
-
-
-def _outlook(record: PlacementRecord) -> str:
-    """Return how much better the best placement of these candidates could be."""
-    objective = record.objective
-    if objective.status == MOVED:
-        return "This is not an optimised placement: the sensors are evaluated where they stand."
-    what = purpose(record.notes) if record.returns is None else ""  # else the sentence before has said it
-    what += "" if record.judgement is None else " by the criterion"
-    better = "cheaper" if objective.cheapest else "better"
-    if objective.status == "optimal":
-        return f"No placement of these candidates is {better}{what}."
-    more = possible_improvement(record)
-    return (
-        "How much better it could be is not known."
-        if more is None
-        else f"At most {more:.1%} {better} is possible{what}."
-    )
 
 
 @dataclass(frozen=True)

@@ -121,25 +121,13 @@ def vehicles(record: VerificationRecord) -> int:
     return sum(change.kind == "vehicle" for change in record.changes)
 
 
-def coverage_rows(steps: CoverageSteps) -> list[tuple[str, float, float | None]]:
-    """Return the causes by which coverage differs from the promise, with the coverage after each and its effect."""
-    shares = (steps.promised, steps.pose, steps.obstacles, steps.installed)
-    causes = ("as promised", "sensors where they are", "objects as they are", "gains as they are")
-    effects = (None, *(after - before for before, after in pairwise(shares)))
-    return list(zip(causes, shares, effects, strict=True))
-
-
-def signed_points(effect: float) -> str:
-    """Return a difference of coverage in percentage points, with its sign."""
-    number = round(100 * effect, 1)
-    return f"{'−' if number < 0 else '+' if number > 0 else ''}{abs(number):.1f}"
-
-
 def coverage_text(steps: CoverageSteps) -> str:
-    """Return promised and installed coverage, and what makes the difference."""
+    """Return promised and installed coverage, and what makes the difference, one effect after the other."""
     names = ("poses of the sensors", "changed objects", "gain")
-    effects = [effect for _, _, effect in coverage_rows(steps) if effect is not None]
-    parts = [f"{name} {signed_points(effect)}" for name, effect in zip(names, effects, strict=True)]
+    shares = pairwise((steps.promised, steps.pose, steps.obstacles, steps.installed))
+    effects = [round(100 * (after - before), 1) for before, after in shares]
+    signs = ["−" if effect < 0 else "+" if effect > 0 else "" for effect in effects]
+    parts = [f"{name} {sign}{abs(effect):.1f}" for name, sign, effect in zip(names, signs, effects, strict=True)]
     return (
         f"The installation sees {steps.installed:.1%} of the road; {steps.promised:.1%} were promised. "
         f"In percentage points: {', '.join(parts)}."

@@ -6,16 +6,15 @@ from functools import cache
 from html import unescape
 from html.parser import HTMLParser
 
-import numpy as np
 import pytest
 
 from seip_addon.core.base.errors import SeipError
 from seip_addon.core.base.progress import finish
-from seip_addon.core.choosing.placement.objective import MOVED, FrontPoint, Objective
+from seip_addon.core.choosing.placement.objective import FrontPoint
 from seip_addon.core.choosing.placement.returns_summary import ReturnsPoint, ReturnsSummary
 from seip_addon.core.output.report.blocks import Card, Facts, Paragraph, Picture, Table, as_html
 from seip_addon.core.output.report.evidence import load_evidence
-from seip_addon.core.output.report.sections import make_report, proof, returns_within, write_report
+from seip_addon.core.output.report.sections import make_report, returns_within, write_report
 from seip_addon.core.output.results.answer import costs_of
 from seip_addon.core.output.results.file_names import REPORT_FILES
 from seip_addon.core.site.installed_cost import load_installed_cost
@@ -113,47 +112,6 @@ def test_the_pdf_is_whole_and_dated_by_the_record(folder):
     assert content.startswith(b"%PDF-1.")
     assert content.rstrip().endswith(b"%%EOF")
     assert b"(D:20260102030405Z)" in content
-
-
-@pytest.mark.parametrize(
-    ("goal", "found", "says"),
-    [
-        (
-            Objective(count=3),
-            {},
-            (
-                r"No other choice of at most 3 sensors among the 32 positions, under the same rules, covers more of "
-                r"the road: this is proven\."
-            ),
-        ),
-        (
-            Objective(count=3),
-            {"status": "feasible", "objective": 500.0, "bound": 509.4, "gap": 0.0188},
-            r"covers more than 1\.4 percentage points more of the road: this bound is proven",
-        ),
-        (
-            Objective(coverage=0.5),
-            {"objective": 30_000.0, "bound": 24_000.0, "gap": 0.2, "status": "feasible"},
-            r"is more than \$6,000 cheaper: this bound is proven",
-        ),
-        (Objective(count=3), {"status": "feasible", "bound": np.inf, "gap": np.inf}, "how much better is not known"),
-        (Objective(count=3), {"status": MOVED, "bound": np.nan, "gap": np.inf}, "without proof of optimality"),
-        (
-            Objective(count=3),
-            {
-                "notes": ("chosen for the worst failure",),
-                "objective": 500.0,
-                "bound": 750.0,
-                "gap": 0.5,
-                "status": "feasible",
-            },
-            r"is better by more than 50\.0%: this bound is proven",
-        ),
-    ],
-)
-def test_the_certificate_is_a_sentence_for_engineers(tmp_path, goal, found, says):
-    make_folder(tmp_path, goal=goal, **found)
-    assert re.search(says, proof(load_evidence(tmp_path)))
 
 
 def test_every_sensor_has_a_card_with_its_place_and_its_costs(folder):

@@ -146,11 +146,16 @@ def test_the_site_file_holds_the_problem_as_it_was_solved(example, tmp_path):
     np.testing.assert_array_equal(found.areas[0].within, central)
     np.testing.assert_array_equal(found.seen, example.deployment.rows)
     np.testing.assert_array_equal(found.targets.xyz, example.site.targets.xyz)
-    again = found.problem
-    for name in ("weights", "prices", "positions", "xyz", "labels", "mandatory_groups", "allowed"):
-        np.testing.assert_array_equal(getattr(again, name), getattr(problem, name))
-    assert (again.count, again.budget, again.min_distance) == (3, None, 0.0)
-    assert again.group_names == problem.group_names
+    np.testing.assert_array_equal(found.weights, problem.weights)
+    with np.load(path) as arrays:
+        for name, expected in (
+            *(("price", problem.prices), ("position", problem.positions), ("xyz", problem.xyz)),
+            *(("sensor", problem.labels), ("mandatory", problem.mandatory_groups), ("forbidden", ~problem.allowed)),
+        ):
+            np.testing.assert_array_equal(arrays[name], expected)
+        header = json.loads(str(arrays["header"]))
+    assert (header["count"], header["budget_usd"], header["min_distance_m"]) == (3, None, 0.0)
+    assert header["groups"] == list(problem.group_names)
 
 
 def test_a_damaged_site_file_is_refused(tmp_path):

@@ -12,6 +12,7 @@ from seip_addon.core.choosing.placement.objective import MOVED, Objective, Solut
 from seip_addon.core.choosing.placement.problem import Placement
 from seip_addon.core.choosing.placement.returns_summary import CrossingReturns, ReturnsSummary
 from seip_addon.core.geometry.geo_reference import GeoReference
+from seip_addon.core.geometry.orientation import degrees
 from seip_addon.core.output.results.placement_record import (
     PlacementRecord,
     Provenance,
@@ -209,3 +210,9 @@ def test_a_foreign_file_is_refused_in_one_sentence(tmp_path, content, says):
     path.write_bytes(content.encode("latin-1"))
     with pytest.raises(SeipError, match=says):
         load_placement(path)
+
+
+def test_headings_are_counter_clockwise_from_zero_to_below_a_full_turn():
+    assert degrees(-math.pi / 2) == 270.0
+    assert degrees(2 * math.pi - 1e-12) == 0.0
+    assert degrees(-1e-12) == 0.0
