@@ -97,15 +97,6 @@ class Format:
     index_files: Callable[[Path, Splits], Mapping[str, bytes]] = lambda _folder, _splits: {}
 
 
-def label_lines(sample: Sample, xyz: Float) -> str:
-    """Return a line ``x y z dx dy dz heading class`` for each box, from which the same float64 are read back.
-
-    ``xyz`` (k, 3) are the points of the boxes that the format refers to, metres.
-    """
-    values = np.column_stack([xyz, sample.boxes.size, sample.boxes.yaw])
-    return "".join(f"{_numbers(row)} {name}\n" for row, name in zip(values, sample.classes, strict=True))
-
-
 def _shortest(value: float) -> str:
     """Return the shortest text that reads back as the same float64, and zero without a sign."""
     return repr(float(value) + 0.0)
@@ -116,7 +107,7 @@ def _numbers(row: Float) -> str:
 
 
 def read_labels(path: Path) -> tuple[Float, list[str]]:
-    """Return the boxes, (k, 7) float64, and their classes from a file of `label_lines`."""
+    """Return the boxes, (k, 7) float64, and their classes from a label file of OpenPCDet."""
     rows = [line.split() for line in path.read_text(encoding="utf-8").splitlines()]
     return np.array([row[:7] for row in rows], dtype=np.float64).reshape(-1, 7), [row[7] for row in rows]
 
@@ -137,7 +128,9 @@ def _openpcdet_files(sample: Sample) -> Files:
     """
     points = io.BytesIO()
     np.save(points, cloud(sample.frame), allow_pickle=False)
-    lines = label_lines(sample, sample.boxes.centre) or NO_OPENPCDET_LABEL
+    values = np.column_stack([sample.boxes.centre, sample.boxes.size, sample.boxes.yaw])
+    rows = (f"{_numbers(row)} {name}\n" for row, name in zip(values, sample.classes, strict=True))
+    lines = "".join(rows) or NO_OPENPCDET_LABEL
     return {f"points/{sample.name}.npy": points.getvalue, f"labels/{sample.name}.txt": lines.encode}
 
 

@@ -69,18 +69,6 @@ def as_png(figure: Figure) -> bytes:
     """Return a figure as PNG; the same figure gives the same bytes.
 
     A palette of the 256 colours that stand for all others makes a file a third to a fifth as large.
-
-    Examples
-    --------
-    A car of 4.5 by 1.8 m in the middle of a page of 4 by 3 inches:
-
-    >>> page = new_page((4.0, 3.0), dpi=50.0)
-    >>> axes = add_axes(page, 0.2, 0.2, 3.6, 2.6)
-    >>> _ = axes.set(xlim=(-9, 9), ylim=(-6.5, 6.5))
-    >>> draw_polygons(axes, box_corners(np.array([[0.0, 0.0, 4.5, 1.8, 0.0]])), facecolor="black")
-    >>> picture = Image.open(io.BytesIO(as_png(page)))
-    >>> picture.size, picture.convert("L").getpixel((100, 75))
-    ((200, 150), 0)
     """
     drawn = io.BytesIO()
     with warnings.catch_warnings():

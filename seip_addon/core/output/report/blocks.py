@@ -72,38 +72,31 @@ Block = Paragraph | Bullets | Table | Facts | Picture | Card
 
 
 @dataclass(frozen=True)
-class Section:
-    """A section with its heading."""
-
-    title: str
-    blocks: tuple[Block, ...]
-
-
-def make_sections(contents: Mapping[str, Iterable[Block]]) -> tuple[Section, ...]:
-    """Return sections by their titles, without empty ones."""
-    sections = (Section(title, tuple(blocks)) for title, blocks in contents.items())
-    return tuple(section for section in sections if section.blocks)
-
-
-@dataclass(frozen=True)
 class Report:
     """A report with the content of its first page.
 
-    ``created`` is the time of the placement (ISO 8601); the time of the report is not recorded.
+    ``created`` is the time of the placement (ISO 8601); the time of the report is not recorded. ``sections`` are
+    blocks by the title of their section.
     """
 
     title: str
     subtitle: str
     created: str
     first: tuple[Block, ...]
-    sections: tuple[Section, ...]
+    sections: Mapping[str, tuple[Block, ...]]
+
+
+def make_sections(contents: Mapping[str, Iterable[Block]]) -> dict[str, tuple[Block, ...]]:
+    """Return blocks by the title of their section, without empty sections."""
+    sections = {title: tuple(blocks) for title, blocks in contents.items()}
+    return {title: blocks for title, blocks in sections.items() if blocks}
 
 
 def as_html(report: Report) -> str:
     """Return the page, which loads nothing."""
     sections = "\n".join(
-        f"<section>\n<h2>{_shown(section.title)}</h2>\n{_blocks(section.blocks)}\n</section>"
-        for section in report.sections
+        f"<section>\n<h2>{_shown(title)}</h2>\n{_blocks(blocks)}\n</section>"
+        for title, blocks in report.sections.items()
     )
     return f"""<!DOCTYPE html>
 <html lang="en">

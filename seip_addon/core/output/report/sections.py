@@ -367,7 +367,9 @@ def _other_choices(evidence: Evidence) -> Iterator[Block]:
     notes += [] if record.judgement is None else record.judgement.sentences()
     if record.returns is not None and record.judgement is None:
         notes.append(sentence(NOT_BY_DETECTION))
-    notes.append("What is proven of other choices refers to the model: this scene, these sensor models and this criterion.")
+    notes.append(
+        "What is proven of other choices refers to the model: this scene, these sensor models and this criterion."
+    )
     yield Bullets(tuple(notes))
     if len(record.front if record.returns is None else record.returns.front) > 1:
         yield from _front(evidence)

@@ -24,11 +24,11 @@ def folder(tmp_path):
 
 
 def section(folder):
-    return next((one for one in make_report(load_evidence(folder)).sections if one.title == TITLE), None)
+    return make_report(load_evidence(folder)).sections[TITLE]
 
 
 def of_kind(folder, kind):
-    return [block for block in section(folder).blocks if isinstance(block, kind)]
+    return [block for block in section(folder) if isinstance(block, kind)]
 
 
 def test_the_section_tells_poses_changes_coverage_and_gain(folder):
