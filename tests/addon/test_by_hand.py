@@ -201,7 +201,7 @@ def test_an_export_that_fails_or_is_stopped_leaves_the_earlier_one_whole(placed,
     def full(*_: object, **_named: object) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(result_folder, "save_plan_view", full)
+    monkeypatch.setattr(result_folder, "draw_plan", full)
     with pytest.raises(RuntimeError, match="No space left on device"):
         bpy.ops.seip.export_result()
     assert {path.name: path.read_bytes() for path in out.iterdir()} == before

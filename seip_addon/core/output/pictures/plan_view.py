@@ -1,7 +1,6 @@
 """The plan of a site: map, title and legend with the sensors, shares of the road, and what lines and marks mean."""
 
 import math
-import os
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -39,7 +38,6 @@ from .drawing import (
     markers_of,
     new_page,
     percent,
-    save_png,
     text_width,
     window_around,
     wrapped,
@@ -96,18 +94,10 @@ ASSUMED_MARK: Style = POLE_MARK | {"mfc": PAPER, "mec": ASSUMED_POLE_COLOUR, "me
 SURFACE, EDGE, TARGET, OBSTACLE, BORDER, CANDIDATE, TEXT, SENSOR = range(8)
 
 
-def save_plan_view(
-    path: str | os.PathLike[str],
-    geometry: SceneGeometry,
-    site: Site,
-    deployment: Deployment,
-    notes: Sequence[str] = (),
-    *,
-    created: str = "",
-) -> None:
-    """Draw the site with its candidates, the chosen sensors and what they see, as PNG.
-
-    The same arguments give the same bytes.
+def draw_plan(
+    geometry: SceneGeometry, site: Site, deployment: Deployment, notes: Sequence[str] = (), *, created: str = ""
+) -> Figure:
+    """Draw the site with its candidates, the chosen sensors and what they see.
 
     Parameters
     ----------
@@ -116,13 +106,6 @@ def save_plan_view(
     created : str
         Time of the placement (ISO 8601), whose date the plan carries.
     """
-    save_png(path, draw_plan(geometry, site, deployment, notes, created=created))
-
-
-def draw_plan(
-    geometry: SceneGeometry, site: Site, deployment: Deployment, notes: Sequence[str] = (), *, created: str = ""
-) -> Figure:
-    """Return the plan as a figure."""
     sensors = np.array([sensor.xyz[:2] for sensor in deployment.sensors]).reshape(-1, 2)
     window, map_height = _window(shapely.union_all([site.region, *shapely.points(sensors)]))
     shown, inch = shapely.box(*window), (window[2] - window[0]) / MAP_WIDTH

@@ -26,14 +26,6 @@ NUMBER_SIZE = 10.0  # points
 
 
 @dataclass(frozen=True, eq=False)
-class Centre:
-    """A point (2,), local metres, from which distances and directions are counted, by what it is the centre of."""
-
-    name: str
-    xy: Float
-
-
-@dataclass(frozen=True, eq=False)
 class BlindSpot:
     """A connected part of the road that no sensor sees: its targets (n,), area in square metres, and place in words.
 
@@ -96,15 +88,15 @@ def _seen(name: str, within: Boolean, targets: Targets, seen_by: Integer) -> See
     return SeenPlace(name, area, float((seen_by[within] > 0).mean()), float((seen_by[within] > 1).mean()))
 
 
-def centres(targets: Targets, areas: Sequence[Area]) -> list[Centre]:
-    """Return the points from which places on the road are counted: the centres of the weighted regions.
+def centres(targets: Targets, areas: Sequence[Area]) -> list[tuple[str, Float]]:
+    """Return the points (2,) from which places on the road are counted, with the names of what they are centres of.
 
-    The weighted region of a site that was built is its junction. Without a weighted region the centre is that of the
-    road to be seen, the mean of its squares.
+    They are the centres of the weighted regions: that of a site that was built is its junction. Without a weighted
+    region the centre is that of the road to be seen, the mean of its squares.
     """
     weighted = [area for area in areas if area.kind == WEIGHTED and area.within.any()]
-    return [Centre(area.name, targets.xyz[area.within, :2].mean(axis=0)) for area in weighted] or [
-        Centre("the road", targets.xyz[:, :2].mean(axis=0))
+    return [(area.name, targets.xyz[area.within, :2].mean(axis=0)) for area in weighted] or [
+        ("the road", targets.xyz[:, :2].mean(axis=0))
     ]
 
 
@@ -114,11 +106,11 @@ def _where(own: Integer, middle: Float, targets: Targets, areas: Sequence[Area])
     A page names the only centre before its list of blind spots.
     """
     origins = centres(targets, areas)
-    nearest = min(origins, key=lambda centre: float(np.hypot(*(middle[:2] - centre.xy))))
-    offset = middle[:2] - nearest.xy
+    name, xy = min(origins, key=lambda centre: float(np.hypot(*(middle[:2] - centre[1]))))
+    offset = middle[:2] - xy
     distance = float(np.hypot(*offset))
     away = f"{distance:.0f} m {direction(offset)} of" if distance >= MIN_DISTANCE else "at"
-    words = f"{away} the centre" + (f" of {nearest.name}" if len(origins) > 1 else "")
+    words = f"{away} the centre" + (f" of {name}" if len(origins) > 1 else "")
     shares = [(int(area.within[own].sum()), area.name) for area in areas]
     most, name = max(shares, key=lambda one: one[0], default=(0, ""))
     if 2 * most < len(own):

@@ -24,7 +24,6 @@ from ..results.file_names import (
 from ..results.placement_record import PlacementRecord, load_placement
 from ..results.site_file import SiteFile, load_site_file
 from ..results.verification_record import VerificationRecord, load_verification
-from .blind_spots import Centre, centres
 
 PICTURES = ("view.png", "plan.png")
 SAME_PLACE = 0.001
@@ -62,11 +61,6 @@ class Evidence:
     def area(self) -> float:
         """Square metres of road."""
         return len(self.site.targets) * self.site.targets.spacing**2
-
-    @property
-    def centres(self) -> list[Centre]:
-        """Points from which places on the road are counted; see `centres`."""
-        return centres(self.site.targets, self.site.areas)
 
     @property
     def geo_reference(self) -> GeoReference:

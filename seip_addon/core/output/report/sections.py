@@ -40,7 +40,7 @@ from ..results.verification_record import (
     pose_text,
     vehicles,
 )
-from .blind_spots import blind_spot_map, blind_spots, seen_places, seen_streets
+from .blind_spots import blind_spot_map, blind_spots, centres, seen_places, seen_streets
 from .blocks import (
     Block,
     Bullets,
@@ -154,7 +154,7 @@ def _summary(evidence: Evidence) -> str:
         seen += f" ({span}, as the sensors' range is only known from data sheets)"
     parts = [f"{seen}."]
     if coverage.central is not None:
-        names = ", ".join(centre.name for centre in evidence.centres)
+        names = ", ".join(name for name, _ in centres(evidence.site.targets, evidence.site.areas))
         parts.append(f"Of the most important part ({names}), {percent(coverage.central)} is seen.")
     if record.returns is not None:
         parts += filter(None, [record.returns.verdict()])
@@ -338,7 +338,7 @@ def _blind_spots(evidence: Evidence) -> Iterator[Block]:
 
 def _counted_from(evidence: Evidence) -> str:
     """Return the sentence that defines distances and directions of blind spots."""
-    names = [f"“{centre.name}”" for centre in evidence.centres]
+    names = [f"“{name}”" for name, _ in centres(evidence.site.targets, evidence.site.areas)]
     if not evidence.site.targets.central.any():
         origin = "the centre of the road, the mean of all its squares"
     elif len(names) == 1:

@@ -123,13 +123,6 @@ def test_kml_is_xml_with_the_same_content(example, placed, features, tmp_path):
     assert any(name.startswith("Seen by S1") for name in seen)
 
 
-def test_the_same_placement_gives_the_same_bytes(placed, tmp_path):
-    for save, name in ((save_geojson, "a.geojson"), (save_kml, "a.kml")):
-        save(tmp_path / name, placed)
-        save(tmp_path / f"again {name}", placed)
-        assert (tmp_path / name).read_bytes() == (tmp_path / f"again {name}").read_bytes()
-
-
 def test_the_site_file_holds_the_problem_as_it_was_solved(example, tmp_path):
     goal = Objective(count=3, central_weight=2.5, forbidden=("signal pole 1",), mandatory=("signal pole 2",))
     geometry = replace(example.geometry, places=(NamedArea("Mill Lane", shapely.box(-100, -7, 0, 7)),))
