@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import io
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from PIL import Image
 
 from ...base.arrays import Boolean, Integer
 from ...base.errors import SeipError
@@ -77,8 +75,6 @@ def load_evidence(folder: Path) -> Evidence:
     SeipError
         The folder is missing, holds no placement, or holds files that are damaged or of different placements.
     """
-    if not folder.is_dir():
-        raise SeipError(f"there is no folder {folder}: name the one that `seip place` has written its result to")
     if not (folder / "placement.json").is_file():
         raise SeipError(f"{folder} holds no placement.json: name a folder that `seip place` has written its result to")
     record, site = load_placement(folder / "placement.json"), load_site_file(folder / "site.npz")
@@ -88,11 +84,11 @@ def load_evidence(folder: Path) -> Evidence:
     names = list(PICTURES)
     names += POSE_ERROR_PICTURES if record.request.goal.scenarios.errs else ()
     names += [TRAFFIC_PICTURE] if record.request.goal.scenarios.kind == "traffic" else []
-    pictures = {name: _picture(folder / name) for name in names if (folder / name).is_file()}
+    pictures = {name: (folder / name).read_bytes() for name in names if (folder / name).is_file()}
     verification = _verification(folder / VERIFICATION_FOLDER, record)
     path = folder / VERIFICATION_FOLDER / VERIFICATION_PICTURE
     if verification is not None and path.is_file():
-        pictures[path.name] = _picture(path, "verify the installation again")
+        pictures[path.name] = path.read_bytes()
     return Evidence(record, site, pictures, verification)
 
 
@@ -107,13 +103,3 @@ def _verification(folder: Path, record: PlacementRecord) -> VerificationRecord |
         if plan is None or plan.sensor != one.sensor or math.dist(plan.local_m, one.planned_m) > SAME_PLACE:
             raise SeipError(f"{path} is of another placement: verify the installation again, or move {folder} away")
     return found
-
-
-def _picture(path: Path, cure: str = "place the sensors again") -> bytes:
-    try:
-        content = path.read_bytes()
-        with Image.open(io.BytesIO(content), formats=("PNG",)) as picture:
-            picture.load()
-    except (OSError, ValueError, SyntaxError, Image.DecompressionBombError) as error:
-        raise SeipError(f"{path} is damaged or no picture: {cure}") from error
-    return content

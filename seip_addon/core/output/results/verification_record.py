@@ -71,7 +71,7 @@ def pose_text(pose: InstalledSensor) -> str:
     ]
     at = f"{pose.id} is {math.hypot(*pose.shift_m):.2f} m from its planned position"
     where = f"{at}: {_listed(parts)}" if parts else at
-    known = f"each within {_within(max(pose.shift_half_width_m), 1000, 'mm')} with 95% confidence"
+    known = f"each within {max(1, math.ceil(1000 * max(pose.shift_half_width_m) - 1e-9)):,} mm with 95% confidence"
     lean_x, lean_y, turn = pose.rotation_deg
     lean, parts = math.hypot(lean_x, lean_y), []
     if abs(turn) >= _LEAST_ANGLE:
@@ -79,9 +79,9 @@ def pose_text(pose: InstalledSensor) -> str:
     if lean >= _LEAST_ANGLE:
         # A rotation vector (x, y) about horizontal axes moves the top of the sensor along (y, -x).
         parts.append(f"tilted {lean:.1f}° to the {direction((lean_y, -lean_x))}")
-    within = _within(max(pose.rotation_half_width_deg), 100, "hundredths of a degree", "one hundredth of a degree")
+    within = max(1, math.ceil(100 * max(pose.rotation_half_width_deg) - 1e-9)) / 100
     points = f"It is {_listed(parts)}" if parts else "It points as planned"
-    return f"{where}, {known}. {points}, within {within}."
+    return f"{where}, {known}. {points}, within {within:.2f}°."
 
 
 def gain_text(pose: InstalledSensor) -> str:
@@ -136,9 +136,3 @@ def coverage_text(steps: CoverageSteps) -> str:
 
 def _listed(parts: Sequence[str]) -> str:
     return " and ".join([", ".join(parts[:-1]), parts[-1]]) if len(parts) > 1 else parts[0]
-
-
-def _within(half: float, per_unit: float, unit: str, single: str = "") -> str:
-    """Return a half width in small units, rounded up."""
-    number = max(1, math.ceil(half * per_unit - 1e-9))
-    return single if number == 1 and single else f"{number:,} {unit}"

@@ -208,7 +208,7 @@ def broken(folder, name, content):
 
 
 def test_each_wrong_folder_has_its_sentence(tmp_path):
-    with pytest.raises(SeipError, match=r"there is no folder .*nowhere: name the one that `seip place`"):
+    with pytest.raises(SeipError, match=r"nowhere holds no placement\.json: name a folder that `seip place`"):
         load_evidence(tmp_path / "nowhere")
     with pytest.raises(SeipError, match=r"placement\.json is damaged"):
         load_evidence(broken(tmp_path / "a", "placement.json", b"{"))

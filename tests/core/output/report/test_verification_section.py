@@ -51,13 +51,10 @@ def test_the_section_tells_poses_changes_coverage_and_gain(folder):
     assert "Kiosk <b>" not in as_html(make_report(load_evidence(folder)))
 
 
-def test_pictures_may_be_missing_but_not_damaged(folder):
+def test_the_picture_may_be_missing(folder):
     make_verification(folder)
     (folder / "verification" / "changes.png").unlink()
     assert len(of_kind(folder, Picture)) == 0
-    (folder / "verification" / "changes.png").write_bytes(b"none")
-    with pytest.raises(SeipError, match=r"changes\.png is damaged .* verify the installation again"):
-        load_evidence(folder)
 
 
 @pytest.mark.parametrize("changed", [{"id": "S99"}, {"local_m": [0.0, 0.0, 9.0]}])

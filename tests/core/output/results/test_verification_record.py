@@ -47,7 +47,7 @@ def test_a_damaged_file_is_refused(tmp_path, changes, says):
 def test_the_pose_is_in_words_with_its_interval():
     assert pose_text(POSE) == (
         "S1 is 0.36 m from its planned position: 0.30 m east and 0.20 m south, each within 2 mm with 95% confidence. "
-        "It is turned 1.5° clockwise as seen from above and tilted 2.0° to the west, within 2 hundredths of a degree."
+        "It is turned 1.5° clockwise as seen from above and tilted 2.0° to the west, within 0.02°."
     )
     upright = make_pose("S1", "type1", (0.0, 0.0, 5.0), shift=(0.0, 0.0, 0.0), rotation=(0.0, 0.0, 0.0))
     assert "It points as planned" in pose_text(upright)
