@@ -19,7 +19,6 @@ from ...base.counts import counted, round_number
 from ...geometry.tangent_plane import plan_metres
 from ...storage.csv_table import save_csv
 from ...storage.files import save_json, whole_file
-from ..pictures.chart_style import plain_legend
 from ..pictures.drawing import (
     Style,
     Window,
@@ -29,6 +28,7 @@ from ..pictures.drawing import (
     draw_corners,
     new_page,
     percent,
+    plain_legend,
     window_around,
 )
 from ..pictures.palette import INK, PAPER, PAPER_STREETS, SHARE_COLOURS, SOFT_INK

@@ -14,7 +14,6 @@ from shapely.geometry.base import BaseGeometry
 from ...base.counts import counted
 from ...sensing.scans.frame import Frame, Labels
 from ...sensing.scans.sensor import MountedSensor
-from .chart_style import plain_legend
 from .drawing import (
     LABEL_SIZE,
     SENSOR_MARK,
@@ -25,6 +24,7 @@ from .drawing import (
     draw_corners,
     draw_polygons,
     new_page,
+    plain_legend,
     save_png,
     window_around,
 )

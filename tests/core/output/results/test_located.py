@@ -56,20 +56,6 @@ def of_kind(features, kind):
     return [one for one in features if one["properties"]["kind"] == kind]
 
 
-def test_sensors_are_points_with_a_height(example, features):
-    found = of_kind(features, "sensor")
-    assert [one["properties"]["id"] for one in found] == [sensor.label for sensor in example.deployment.sensors]
-    mercator = example.site.geo_reference.mercator
-    for one, sensor in zip(found, example.deployment.sensors, strict=True):
-        longitude, latitude, height = one["geometry"]["coordinates"]
-        metres = mercator(np.radians(latitude), np.radians(longitude))
-        there = sensor.xyz + example.site.origin + OFFSET
-        np.testing.assert_allclose(metres, there[:2], atol=2e-3)
-        assert height == pytest.approx(there[2], abs=1e-3)
-        assert one["properties"]["price_usd"] == sensor.price
-        assert {"sensor", "height_m", "tilt_deg", "yaw_deg"} <= set(one["properties"])
-
-
 def test_every_ring_is_closed_and_outer_ones_turn_counter_clockwise(features):
     areas = [shapely.get_parts(shape(one["geometry"])) for one in features if one["geometry"]["type"] != "Point"]
     for polygon in np.concatenate(areas):

@@ -31,17 +31,9 @@ def test_a_file_gives_what_was_written(tmp_path):
     assert load_verification(written(tmp_path / "v.json", versions={"seip": "1"})) == RECORD
 
 
-@pytest.mark.parametrize(
-    ("changes", "says"),
-    [
-        ({"schema": "seip-verification/9"}, "has the schema 'seip-verification/9'"),
-        ({"sensors": [{}]}, r"sensors\[0\]\.id is missing"),
-        ({"changes": [as_json(CHANGES[0]) | {"box": [1.0]}]}, "must be a list of 7 values"),
-    ],
-)
-def test_a_damaged_file_is_refused(tmp_path, changes, says):
-    with pytest.raises(SeipError, match=says):
-        load_verification(written(tmp_path / "v.json", **changes))
+def test_a_file_of_another_version_is_refused(tmp_path):
+    with pytest.raises(SeipError, match="has the schema 'seip-verification/9'"):
+        load_verification(written(tmp_path / "v.json", schema="seip-verification/9"))
 
 
 def test_the_pose_is_in_words_with_its_interval():
