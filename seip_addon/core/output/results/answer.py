@@ -75,7 +75,7 @@ def outlook(record: PlacementRecord) -> str:
     what += "" if record.judgement is None else " by the criterion"
     better = "cheaper" if objective.cheapest else "better"
     if objective.status == "optimal":
-        return f"No placement of these candidates is {better}{what}."
+        return f"It is proven that no placement of these candidates is {better}{what}."
     more = possible_improvement(record)
     return (
         "How much better it could be is not known."
