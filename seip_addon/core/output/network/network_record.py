@@ -6,10 +6,9 @@ import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Literal
 
 from ...choosing.placement.returns_summary import returns_text
-from ...storage.json_dataclass import as_json
 from ..pictures.drawing import percent
 
 SCHEMA = "seip-network/3"
@@ -131,11 +130,6 @@ def network_gap(criterion: Literal["road", "returns"], value: float, bound: floa
     if criterion == "returns":
         return math.expm1(max(0.0, bound - value))
     return max(0.0, bound / value - 1.0) if value > 0 else math.inf if bound > 0 else 0.0
-
-
-def network_json(record: NetworkRecord) -> dict[str, Any]:
-    """Return a record as a JSON value with its schema."""
-    return {"schema": SCHEMA, **as_json(record)}
 
 
 def ranked_sites(record: NetworkRecord) -> list[tuple[NetworkSite, float | None]]:

@@ -19,6 +19,7 @@ from ...base.counts import counted, round_number
 from ...geometry.tangent_plane import plan_metres
 from ...storage.csv_table import save_csv
 from ...storage.files import save_json, whole_file
+from ...storage.json_dataclass import as_json
 from ..pictures.drawing import (
     Style,
     Window,
@@ -36,7 +37,7 @@ from ..report.blocks import Block, Bullets, Facts, Paragraph, Picture, Report, T
 from ..report.pdf import save_report
 from ..results.answer import date, dollars, sentence
 from ..results.geographic_files import DECIMALS, Feature, feature, save_features
-from .network_record import NetworkRecord, NetworkSite, gain_text, network_json, outcome, ranked_sites, sensors_text
+from .network_record import SCHEMA, NetworkRecord, NetworkSite, gain_text, outcome, ranked_sites, sensors_text
 
 COLUMNS = (
     *("rank", "name", "latitude_deg", "longitude_deg", "weight", "status", "sensors", "types", "price_usd", "value"),
@@ -91,7 +92,7 @@ def write_network(folder: Path, record: NetworkRecord, streets: Sequence[Street]
         The folder or a file cannot be written.
     """
     drawn = draw_map(record, streets)
-    save_json(folder / NETWORK_FILES[0], network_json(record))
+    save_json(folder / NETWORK_FILES[0], {"schema": SCHEMA, **as_json(record)})
     save_features(folder / NETWORK_FILES[1], record.name, record.attribution, _features(record))
     rows = [[figures[name] for name in COLUMNS] for _, figures in _rows(record)]
     save_csv(folder / NETWORK_FILES[2], COLUMNS, rows)

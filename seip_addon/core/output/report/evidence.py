@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ...base.arrays import Boolean, Integer
+from ...base.arrays import Integer
 from ...base.errors import SeipError
 from ...geometry.geo_reference import GeoReference
 from ..results.file_names import (
@@ -49,11 +49,6 @@ class Evidence:
     def seen_by(self) -> Integer:
         """Number of sensors that see each target, (t,) int64."""
         return np.asarray(self.site.seen.sum(axis=0, dtype=np.int64))
-
-    @property
-    def seen(self) -> Boolean:
-        """Mask of the targets that some sensor sees, (t,) bool."""
-        return self.seen_by > 0
 
     @property
     def area(self) -> float:

@@ -310,7 +310,7 @@ def _places(evidence: Evidence) -> Iterator[Block]:
 
 
 def _blind_spots(evidence: Evidence) -> Iterator[Block]:
-    spots = blind_spots(evidence.site.targets, evidence.seen, evidence.site.areas)
+    spots = blind_spots(evidence.site.targets, evidence.seen_by > 0, evidence.site.areas)
     if not spots:
         yield Paragraph("There are none: every square of the road is seen.")
         return

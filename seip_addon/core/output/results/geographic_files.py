@@ -16,7 +16,7 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from ...base.arrays import Boolean, Float
-from ...choosing.placement.deployment import Deployment, Sensor
+from ...choosing.placement.deployment import Deployment
 from ...geometry.orientation import degrees, tilt_degrees
 from ...geometry.plan import closed
 from ...site.scene_geometry import NamedArea, SceneGeometry
@@ -63,20 +63,15 @@ class Located:
     region: tuple[shapely.Polygon, ...]
     weighted: tuple[tuple[NamedArea, tuple[shapely.Polygon, ...]], ...]
 
-    @property
-    def sensors(self) -> tuple[Sensor, ...]:
-        """The sensors, in the order of the points."""
-        return self.deployment.sensors
-
     def patches(self) -> Iterator[tuple[list[str], tuple[shapely.Polygon, ...]]]:
         """Yield for each set of sensors, by their labels, the road that these see and no others."""
         squares = np.round(target_squares(self.site.targets)[:, :, :2], METRE_DECIMALS)
-        rows: Boolean = self.deployment.rows.reshape(len(self.sensors), len(squares))
+        rows: Boolean = self.deployment.rows.reshape(-1, len(squares))
         sets, which = np.unique(rows.T, axis=0, return_inverse=True)
         for number in range(len(sets)):
             own = which.ravel() == number
             area = shapely.coverage_union_all(shapely.polygons(squares[own]))
-            seers = [sensor.label for sensor, sees in zip(self.sensors, sets[number], strict=True) if sees]
+            seers = [sensor.label for sensor, sees in zip(self.deployment.sensors, sets[number], strict=True) if sees]
             yield seers, _polygons(self.site, area)
 
 
@@ -123,7 +118,7 @@ def feature(kind: str, shape: str, coordinates: object, **properties: object) ->
 
 
 def _features(placed: Located) -> Iterator[Feature]:
-    for sensor, point in zip(placed.sensors, placed.points.tolist(), strict=True):
+    for sensor, point in zip(placed.deployment.sensors, placed.points.tolist(), strict=True):
         about = {
             "id": sensor.label,
             "sensor": sensor.model.key,
@@ -185,7 +180,7 @@ def save_kml(path: str | os.PathLike[str], placed: Located) -> None:
         _add(filled, "fill", str(int(bool(fill))))
     sensors, areas, coverage = (_add(document, "Folder") for _ in range(3))
     _add(sensors, "name", "Sensors")
-    for sensor, (longitude, latitude, _) in zip(placed.sensors, placed.points.tolist(), strict=True):
+    for sensor, (longitude, latitude, _) in zip(placed.deployment.sensors, placed.points.tolist(), strict=True):
         about = {
             "sensor": sensor.model.key,
             "position": sensor.position_name,

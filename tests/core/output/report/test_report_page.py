@@ -22,7 +22,6 @@ from tests.builders.report_folder import CROSSING, NAME, make_folder
 
 EFFORT = 0.2
 VOID = {"meta", "img", "link", "br"}
-"""Lines of the project that a report may import."""
 
 
 class Page(HTMLParser):
