@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from seip_addon.core.base.arrays import Float
-from seip_addon.core.output.pictures.chart_style import (
+from seip_addon.core.output.pictures.drawing import (
     FAINT_COLOUR,
     colour,
     mark,

@@ -14,8 +14,15 @@ from matplotlib.path import Path
 from shapely.geometry.base import BaseGeometry
 
 from seip_addon.core.base.arrays import Boolean, Float
-from seip_addon.core.output.pictures.chart_style import limits_around, new_figure, save_chart
-from seip_addon.core.output.pictures.drawing import SENSOR_MARK, box_corners, draw_attribution, draw_polygons
+from seip_addon.core.output.pictures.drawing import (
+    SENSOR_MARK,
+    box_corners,
+    draw_attribution,
+    draw_polygons,
+    limits_around,
+    new_figure,
+    save_chart,
+)
 from seip_addon.core.output.pictures.palette import INK, SOFT_INK
 
 TRUTH_COLOUR, DETECTED_COLOUR, IGNORED_COLOUR = "#00875a", "#d1242f", "#a9b1b8"

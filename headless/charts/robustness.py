@@ -19,19 +19,22 @@ from seip_addon.core.choosing.placement.objective import Solution
 from seip_addon.core.choosing.robustness.comparison import Comparison, EvaluatedPlacement
 from seip_addon.core.choosing.robustness.pose_study import PoseStudy
 from seip_addon.core.geometry.plan import closed, outline
-from seip_addon.core.output.pictures.chart_style import (
+from seip_addon.core.output.pictures.drawing import (
     DASHED,
     add_legend,
     colour,
+    draw_area,
+    draw_attribution,
+    draw_polygons,
+    draw_sensors,
     limits_around,
     mark,
     new_figure,
     save_chart,
     style_axes,
 )
-from seip_addon.core.output.pictures.drawing import draw_attribution, draw_polygons, draw_sensors
 from seip_addon.core.output.pictures.palette import INK, SEEN_COLOURS, SERIES_COLOURS, SOFT_INK
-from seip_addon.core.output.pictures.plan_map import MAX_GAP, draw_area
+from seip_addon.core.output.pictures.plan_view import MAX_GAP
 from seip_addon.core.output.results.file_names import POSE_ERROR_PICTURES, TRAFFIC_PICTURE
 from seip_addon.core.site.scene_geometry import SceneGeometry, joined
 from seip_addon.core.site.targets import target_squares

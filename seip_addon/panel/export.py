@@ -10,8 +10,8 @@ from tempfile import TemporaryDirectory
 import bpy
 
 from ..core.base.progress import Progress
-from ..core.output.pictures.colours import unpacked_counts
 from ..core.output.pictures.labelled_view import save_labelled_view
+from ..core.output.pictures.palette import unpacked_counts
 from ..core.output.report.sections import write_report
 from ..core.output.results.placement_record import parsed_record
 from ..core.storage.files import check_folder

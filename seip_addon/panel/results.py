@@ -15,7 +15,7 @@ from ..core.base.errors import SeipError
 from ..core.base.progress import Progress
 from ..core.choosing.placement.objective import Objective
 from ..core.choosing.placement.returns_summary import returns_text
-from ..core.output.pictures.colours import compare, packed_counts, unpacked_counts
+from ..core.output.pictures.palette import compare, packed_counts, unpacked_counts
 from ..core.output.results.answer import answer, change_text
 from ..core.output.results.placement_record import PlacementRecord, Provenance, parsed_record
 from ..core.output.results.versions import versions

@@ -10,8 +10,15 @@ import numpy as np
 
 from ..core.base.counts import counted
 from ..core.base.progress import Progress, finish
-from ..core.output.pictures.colours import By, cloud_colours, sensor_colour, strength_ramp
-from ..core.output.pictures.palette import MAX_INTENSITY, STATIC_COLOUR, rgb
+from ..core.output.pictures.palette import (
+    MAX_INTENSITY,
+    STATIC_COLOUR,
+    By,
+    cloud_colours,
+    rgb,
+    sensor_colour,
+    strength_ramp,
+)
 from ..core.output.results.versions import versions
 from ..core.sensing.scans.frame import Frame
 from ..core.sensing.scans.run_folder import Run

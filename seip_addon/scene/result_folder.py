@@ -13,9 +13,10 @@ from ..core.base.errors import SeipError
 from ..core.base.progress import Progress
 from ..core.choosing.placement.deployment import Deployment
 from ..core.choosing.placement.objective import Solution, placement_constraints
-from ..core.output.pictures.colours import packed_counts
+from ..core.output.pictures.drawing import save_png
 from ..core.output.pictures.labelled_view import save_labelled_view
-from ..core.output.pictures.plan_view import save_plan_view
+from ..core.output.pictures.palette import packed_counts
+from ..core.output.pictures.plan_view import draw_plan
 from ..core.output.results.file_names import REPORT_FILES
 from ..core.output.results.geographic_files import LOCATED_FILES, located, save_geojson, save_kml
 from ..core.output.results.placement_record import PlacementRecord, save_placement
@@ -142,4 +143,4 @@ def write_tables(
         save_kml(part["placement.kml"], placed)
     yield Progress(1, 2, "drawing the plan", counted=False)
     created = record.times.created
-    save_plan_view(part["plan.png"], geometry, site, deployment, solution.caption, created=created)
+    save_png(part["plan.png"], draw_plan(geometry, site, deployment, solution.caption, created=created))

@@ -12,7 +12,7 @@ from ..core.base.arrays import Float, Integer
 from ..core.base.errors import SeipError
 from ..core.choosing.placement.deployment import Deployment, Sensor
 from ..core.geometry.solids import Solid, join, prism, tube
-from ..core.output.pictures.colours import Aspect, Colouring, Legend, as_placed, colouring
+from ..core.output.pictures.palette import Aspect, Colouring, Legend, as_placed, colouring
 from ..core.site.roles import AREA_OVERLAYS
 from ..core.site.site import Site, Targets
 from ..core.site.targets import target_squares

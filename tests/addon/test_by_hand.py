@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from seip_addon.core.choosing.placement.objective import MOVED, MOVED_MESSAGE, Objective
-from seip_addon.core.output.pictures.colours import unpacked_counts
+from seip_addon.core.output.pictures.palette import unpacked_counts
 from seip_addon.core.output.results.answer import status_text
 from seip_addon.core.output.results.placement_record import comparable, load_placement, parsed_record
 from seip_addon.panel import coverage, following, placement, results, scene_status, sensors
@@ -201,7 +201,7 @@ def test_an_export_that_fails_or_is_stopped_leaves_the_earlier_one_whole(placed,
     def full(*_: object, **_named: object) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(result_folder, "save_plan_view", full)
+    monkeypatch.setattr(result_folder, "draw_plan", full)
     with pytest.raises(RuntimeError, match="No space left on device"):
         bpy.ops.seip.export_result()
     assert {path.name: path.read_bytes() for path in out.iterdir()} == before

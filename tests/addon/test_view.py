@@ -6,7 +6,7 @@ import pytest
 
 import seip_addon
 from seip_addon.core.choosing.placement.returns_summary import returns_text
-from seip_addon.core.output.pictures.colours import unpacked_counts
+from seip_addon.core.output.pictures.palette import unpacked_counts
 from seip_addon.core.output.results.placement_record import parsed_record
 from seip_addon.panel import following, overlays
 from seip_addon.panel import results as results_panel

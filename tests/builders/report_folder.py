@@ -23,7 +23,8 @@ from seip_addon.core.choosing.placement.problem import Placement
 from seip_addon.core.choosing.placement.returns_summary import CrossingReturns
 from seip_addon.core.choosing.placement.solver import front_of
 from seip_addon.core.geometry.geo_reference import GeoReference
-from seip_addon.core.output.pictures.plan_view import save_plan_view
+from seip_addon.core.output.pictures.drawing import save_png
+from seip_addon.core.output.pictures.plan_view import draw_plan
 from seip_addon.core.output.results.placement_record import Provenance, placement_record, save_placement
 from seip_addon.core.output.results.site_file import save_site_file
 from seip_addon.core.sensing.visibility.grid import VisibilityGrid
@@ -100,7 +101,7 @@ def make_folder(
     save_site_file(folder / "site.npz", KEY, example.geometry, example.site, solution, problem)
     VisibilityGrid(np.packbits(example.visible, axis=1), example.visible.shape, KEY, {}).save(folder / "visibility.npz")
     if pictures:
-        save_plan_view(folder / "plan.png", example.geometry, example.site, deployment)
+        save_png(folder / "plan.png", draw_plan(example.geometry, example.site, deployment))
     return example
 
 

@@ -15,7 +15,7 @@ import pytest
 import shapely
 from matplotlib.collections import PolyCollection
 
-from seip_addon.core.output.pictures import chart_style as style
+from seip_addon.core.output.pictures import drawing as style
 from tests.builders.charts import is_drawn, legend, record_figures, words
 
 

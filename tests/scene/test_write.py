@@ -8,7 +8,7 @@ import pytest
 
 from seip_addon.core.choosing.placement.deployment import deploy
 from seip_addon.core.output.pictures import labelled_view
-from seip_addon.core.output.pictures.colours import colouring
+from seip_addon.core.output.pictures.palette import colouring
 from seip_addon.core.output.pictures.viewpoint import Sight
 from seip_addon.scene import contract
 from seip_addon.scene.materials import linear

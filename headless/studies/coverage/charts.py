@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import PercentFormatter
 
-from seip_addon.core.output.pictures.chart_style import (
+from seip_addon.core.output.pictures.drawing import (
     DASHED,
     add_legend,
     colour,

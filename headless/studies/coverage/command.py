@@ -15,7 +15,8 @@ from headless.studies.survey_options import study_parser
 
 from seip_addon.core.choosing.placement.objective import Objective, check_objective
 from seip_addon.core.geometry.orientation import tilt_degrees
-from seip_addon.core.output.pictures.plan_view import save_plan_view
+from seip_addon.core.output.pictures.drawing import save_png
+from seip_addon.core.output.pictures.plan_view import draw_plan
 from seip_addon.core.storage.csv_table import save_csv
 
 COLUMNS = (
@@ -49,7 +50,7 @@ def main(argv: list[str]) -> None:
                 if case is not None:
                     name = f"plan_{sensor}_{'vanilla' if weight == 1.0 else 'weighted'}.png"
                     notes = [] if weight == 1.0 else [f"Optimised with weight {weight:g} in weighted regions."]
-                    save_plan_view(folder / name, surveyed.geometry, site, case.deployment, notes)
+                    save_png(folder / name, draw_plan(surveyed.geometry, site, case.deployment, notes))
         save_claims(folder / "claims.md", claims, site.name)
     for claim in claims:
         runtime.print_line(claim.describe())

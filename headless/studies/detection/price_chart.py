@@ -16,15 +16,16 @@ import numpy as np
 from matplotlib.ticker import FuncFormatter, NullFormatter
 
 from seip_addon.core.base.estimates import Interval
-from seip_addon.core.output.pictures.chart_style import (
+from seip_addon.core.output.pictures.drawing import (
     DASHED,
     add_legend,
     colour,
+    draw_callouts,
     new_figure,
+    save_png,
     set_title,
     style_axes,
 )
-from seip_addon.core.output.pictures.drawing import draw_callouts, save_png
 from seip_addon.core.output.pictures.palette import SOFT_INK
 
 

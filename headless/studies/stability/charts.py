@@ -9,7 +9,7 @@ from typing import Any
 from matplotlib.axes import Axes
 from matplotlib.ticker import PercentFormatter, StrMethodFormatter
 
-from seip_addon.core.output.pictures.chart_style import DASHED, colour, mark, new_figure, save_chart, style_axes
+from seip_addon.core.output.pictures.drawing import DASHED, colour, mark, new_figure, save_chart, style_axes
 from seip_addon.core.output.pictures.palette import SOFT_INK
 
 from .criterion import CriterionStudy, SpacingAnswer

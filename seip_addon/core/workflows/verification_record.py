@@ -6,7 +6,6 @@ import math
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 from ..base.distinct_names import distinct_names
 from ..output.pictures.verification import save_changes_picture
@@ -45,8 +44,8 @@ def write_verification(
     save_changes_picture(folder / VERIFICATION_PICTURE, geometry, planned, found)
     save_changes(folder / CHANGES_FILE, found)
     save_units(folder / UNITS_FILE, recording, found)
-    record = verification_record(geometry.name, recording, found)
-    save_json(folder / VERIFICATION_FILE, record | {"versions": dict(versions)})
+    record = as_json(record_of(geometry.name, recording, found))
+    save_json(folder / VERIFICATION_FILE, {"schema": SCHEMA, **record, "versions": dict(versions)})
 
 
 def record_of(site: str, recording: str, found: Verification) -> VerificationRecord:
@@ -62,11 +61,6 @@ def record_of(site: str, recording: str, found: Verification) -> VerificationRec
         for change, cost in zip(found.changes, found.costs, strict=True)
     ]
     return VerificationRecord(site, recording, found.sensors, tuple(changes), found.coverage)
-
-
-def verification_record(site: str, recording: str, found: Verification) -> dict[str, Any]:
-    """Return the content of ``verification.json``."""
-    return {"schema": SCHEMA, **as_json(record_of(site, recording, found))}
 
 
 def save_units(path: Path, recording: str, found: Verification) -> None:

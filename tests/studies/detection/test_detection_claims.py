@@ -7,7 +7,7 @@ from headless.studies.detection.price_chart import PrecisionCell, save_price_cha
 import numpy as np
 import pytest
 
-from seip_addon.core.output.pictures import chart_style as style
+from seip_addon.core.output.pictures import drawing as style
 from tests.builders.charts import is_drawn, line, record_figures
 
 PRICE = {"type1": 6000.0, "type2": 15000.0, "type3": 80000.0}

@@ -1,6 +1,7 @@
 """A dataset's folder: samples run by run, and ``manifest.json`` with settings, counts and digests."""
 
 import hashlib
+import json
 from collections import Counter
 from collections.abc import Callable, Generator, Iterable, Mapping
 from dataclasses import dataclass
@@ -11,8 +12,8 @@ from typing import Any, Literal
 from ...base.errors import SeipError
 from ...base.progress import Progress
 from ...sensing.scans.frame import Frame
-from ...storage.files import digest, parse_json, save_json, whole_file
-from ...storage.json_dataclass import from_json
+from ...storage.files import digest, save_json, whole_file
+from ...storage.json_dataclass import read_record
 from ..results.versions import versions
 from .formats import Format
 from .sample import OUTCOMES, SPLITS, Sample, TrafficRun, make_sample, require_file_name
@@ -112,17 +113,11 @@ def load_manifest(folder: str | Path) -> Record:
     """Return the manifest of a dataset; raise `SeipError` if there is none, or it is damaged or of another version."""
     path = Path(folder) / MANIFEST
     try:
-        manifest = parse_json(path.read_bytes())
-        known = manifest["schema"] == SCHEMA
-        if known:
-            from_json(_StoredDataset, manifest)
-    except FileNotFoundError as error:
+        content = path.read_bytes()
+    except OSError as error:
         raise SeipError(f"there is no dataset in {folder}: it has no {MANIFEST}; write one") from error
-    except (OSError, ValueError, TypeError, LookupError, AttributeError, RecursionError) as error:
-        raise SeipError(f"{path} is damaged; delete the folder and write the dataset again") from error
-    if not known:
-        raise SeipError(f"{path} is not of this version; write the dataset again into another folder")
-    return dict(manifest)
+    read_record(_StoredDataset, content, (SCHEMA,), str(path), "delete the folder and write the dataset again")
+    return dict(json.loads(content))
 
 
 def _manifest_of(folder: Path, kind: Format, min_points: int) -> Record:

@@ -14,6 +14,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from string import Template
 from typing import Any
 
 import numpy as np
@@ -22,7 +23,7 @@ from PIL import Image
 
 from ...base.arrays import Float
 from ...geometry.orientation import quaternion_of
-from .sample import MERGED, Sample, cloud, shortest
+from .sample import MERGED, Sample, cloud
 
 Files = dict[str, Callable[[], bytes]]
 """Functions that return the bytes of each file, by its path in the folder of a dataset."""
@@ -53,7 +54,6 @@ NO_OPENPCDET_LABEL = "0.0 0.0 0.0 1.0 1.0 1.0 0.0 DontCare\n"  # the label of a 
 PLAN_STEP = 6.4  # what the range is a multiple of in plan, metres: 16 pillars of 0.4, 32 of 0.2 or 64 of 0.1 m
 HEIGHT_STEP = 2.0  # what the range is a multiple of in height, metres: 40 voxels of 0.05 m, as networks ask for
 MARGIN = 0.5  # between the boxes and the range, metres
-PILLAR_SIZE = 0.2
 KITTI_CLASSES = {category: KITTI_CLASS[name] for category, name in CLASSES.items()}
 """KITTI has neither buses nor motorcycles; readers ignore or refuse a name that it does not have."""
 NO_KITTI_LABEL = "DontCare -1 -1 -10 0 0 0 0 -1 -1 -1 -1000 -1000 -1000 -10\n"  # the label of a frame without any
@@ -97,21 +97,17 @@ class Format:
     index_files: Callable[[Path, Splits], Mapping[str, bytes]] = lambda _folder, _splits: {}
 
 
-def label_lines(sample: Sample, xyz: Float) -> str:
-    """Return a line ``x y z dx dy dz heading class`` for each box, from which the same float64 are read back.
-
-    ``xyz`` (k, 3) are the points of the boxes that the format refers to, metres.
-    """
-    values = np.column_stack([xyz, sample.boxes.size, sample.boxes.yaw])
-    return "".join(f"{_numbers(row)} {name}\n" for row, name in zip(values, sample.classes, strict=True))
+def _shortest(value: float) -> str:
+    """Return the shortest text that reads back as the same float64, and zero without a sign."""
+    return repr(float(value) + 0.0)
 
 
 def _numbers(row: Float) -> str:
-    return " ".join(map(shortest, row))
+    return " ".join(map(_shortest, row))
 
 
 def read_labels(path: Path) -> tuple[Float, list[str]]:
-    """Return the boxes, (k, 7) float64, and their classes from a file of `label_lines`."""
+    """Return the boxes, (k, 7) float64, and their classes from a label file of OpenPCDet."""
     rows = [line.split() for line in path.read_text(encoding="utf-8").splitlines()]
     return np.array([row[:7] for row in rows], dtype=np.float64).reshape(-1, 7), [row[7] for row in rows]
 
@@ -132,7 +128,9 @@ def _openpcdet_files(sample: Sample) -> Files:
     """
     points = io.BytesIO()
     np.save(points, cloud(sample.frame), allow_pickle=False)
-    lines = label_lines(sample, sample.boxes.centre) or NO_OPENPCDET_LABEL
+    values = np.column_stack([sample.boxes.centre, sample.boxes.size, sample.boxes.yaw])
+    rows = (f"{_numbers(row)} {name}\n" for row, name in zip(values, sample.classes, strict=True))
+    lines = "".join(rows) or NO_OPENPCDET_LABEL
     return {f"points/{sample.name}.npy": points.getvalue, f"labels/{sample.name}.txt": lines.encode}
 
 
@@ -164,42 +162,13 @@ def point_cloud_range(boxes: Float) -> Float:
 
 def _configuration(boxes: Float) -> str:
     """Return the YAML text: values that JSON writes are YAML too."""
-    extent = point_cloud_range(boxes)
-    features = ["x", "y", "z", "intensity"]
-    values = {
-        "DATASET": "CustomDataset",
-        "DATA_PATH": "../data/custom",
-        "CLASS_NAMES": list(CLASSES.values()),
-        "POINT_CLOUD_RANGE": extent.tolist(),
-        "MAP_CLASS_TO_KITTI": KITTI_CLASS,
-        "DATA_SPLIT": {"train": "train", "test": "val"},
-        "INFO_PATH": {"train": ["custom_infos_train.pkl"], "test": ["custom_infos_val.pkl"]},
-        "POINT_FEATURE_ENCODING": {
-            "encoding_type": "absolute_coordinates_encoding",
-            "used_feature_list": features,
-            "src_feature_list": features,
-        },
-        "DATA_AUGMENTOR": {
-            "DISABLE_AUG_LIST": ["placeholder"],
-            "AUG_CONFIG_LIST": [
-                {"NAME": "random_world_flip", "ALONG_AXIS_LIST": ["x", "y"]},
-                {"NAME": "random_world_rotation", "WORLD_ROT_ANGLE": [-0.78539816, 0.78539816]},
-                {"NAME": "random_world_scaling", "WORLD_SCALE_RANGE": [0.95, 1.05]},
-            ],
-        },
-        "DATA_PROCESSOR": [
-            {"NAME": "mask_points_and_boxes_outside_range", "REMOVE_OUTSIDE_BOXES": True},
-            {"NAME": "shuffle_points", "SHUFFLE_ENABLED": {"train": True, "test": False}},
-            {
-                "NAME": "transform_points_to_voxels",
-                "VOXEL_SIZE": [PILLAR_SIZE, PILLAR_SIZE, round(float(extent[5] - extent[2]), 1)],
-                "MAX_POINTS_PER_VOXEL": 32,
-                "MAX_NUMBER_OF_VOXELS": {"train": 40000, "test": 40000},
-            },
-        ],
-    }
-    head = "# CLASS_NAMES: for the model's configuration. What next: OpenPCDet, docs/CUSTOM_DATASET_TUTORIAL.md\n"
-    return head + "".join(f"{key}: {json.dumps(value)}\n" for key, value in values.items())
+    extent = point_cloud_range(boxes).tolist()
+    return Template(Path(__file__).with_name("custom_dataset.yaml").read_text(encoding="utf-8")).substitute(
+        classes=json.dumps(list(CLASSES.values())),
+        range=json.dumps(extent),
+        kitti=json.dumps(KITTI_CLASS),
+        height=round(extent[5] - extent[2], 1),
+    )
 
 
 def _kitti_files(sample: Sample) -> Files:
@@ -224,7 +193,7 @@ def _label_file(sample: Sample) -> bytes:
     numbers, alpha = camera_boxes(boxes.centre, boxes.size, boxes.yaw)
     occluded = np.where(boxes.visibility >= FULLY_VISIBLE, 0, np.where(boxes.visibility >= PARTLY_VISIBLE, 1, 2))
     lines = "".join(
-        f"{name} 0 {hidden} {shortest(angle)} 0 0 {PIXELS} {PIXELS} {_numbers(row)}\n"
+        f"{name} 0 {hidden} {_shortest(angle)} 0 0 {PIXELS} {PIXELS} {_numbers(row)}\n"
         for name, hidden, angle, row in zip(sample.classes, occluded, alpha, numbers, strict=True)
     )
     return (lines or NO_KITTI_LABEL).encode()
@@ -310,15 +279,15 @@ def kitti_results(boxes: Float, categories: Sequence[str], score: Float) -> str:
     """
     numbers, alpha = camera_boxes(boxes[:, :3], boxes[:, 3:6], boxes[:, 6])
     return "".join(
-        f"{KITTI_CLASSES[category]} -1 -1 {shortest(angle)} 0 0 {PIXELS} {PIXELS} {_numbers(row)} {shortest(points)}\n"
-        for category, angle, row, points in zip(categories, alpha, numbers, score, strict=True)
+        f"{KITTI_CLASSES[category]} -1 -1 {_shortest(angle)} 0 0 {PIXELS} {PIXELS} {_numbers(row)} {_shortest(one)}\n"
+        for category, angle, row, one in zip(categories, alpha, numbers, score, strict=True)
     )
 
 
 def openpcdet_results(boxes: Float, categories: Sequence[str], score: Float) -> str:
     """Return a line ``x y z dx dy dz heading class score`` for each detection; see `kitti_results`."""
     return "".join(
-        f"{_numbers(row)} {CLASSES[category]} {shortest(points)}\n"
+        f"{_numbers(row)} {CLASSES[category]} {_shortest(points)}\n"
         for row, category, points in zip(boxes, categories, np.asarray(score), strict=True)
     )
 

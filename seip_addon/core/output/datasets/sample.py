@@ -17,11 +17,7 @@ from ...sensing.scans.sensor import MountedSensor
 SPLITS = ("train", "val", "test")
 MERGED = "merged"  # name of the cloud of all sensors together
 
-WRITTEN = "written"
-OUTSIDE = "outside_region"
-NO_CLASS = "no_class"
-TOO_FEW = "too_few_points"
-OUTCOMES = (WRITTEN, OUTSIDE, NO_CLASS, TOO_FEW)
+OUTCOMES = WRITTEN, OUTSIDE, NO_CLASS, TOO_FEW = "written", "outside_region", "no_class", "too_few_points"
 """Outcomes of a label, as the manifest counts them; the first that applies of those after `WRITTEN`."""
 
 _FILE_NAME = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9_.-]{0,99}")
@@ -101,19 +97,6 @@ def make_sample(
     """Return a frame, by its number in the dataset and its id in the run, with the labels that are to be written.
 
     A label needs a class of the format and ``min_points`` returns of all sensors together.
-
-    Examples
-    --------
-    >>> from seip_addon.core.sensing.lidar.catalogue import load_catalogue
-    >>> sensor = MountedSensor("S1", load_catalogue()["vlp16"], np.array([0.0, 0.0, 5.0]), np.eye(3))
-    >>> run = TrafficRun("run-1", "train", "digest", (sensor,), origin=np.zeros(3))
-    >>> number, category, points = np.array([0, 1]), np.array(["car", "pedestrian"]), np.array([[120], [2]])
-    >>> boxes = np.zeros((2, 3)), np.ones((2, 3)), *np.zeros((3, 2))
-    >>> users = Labels(number, category, *boxes, points, visibility=np.ones(2), inside=np.ones(2, bool))
-    >>> frame = Frame(12.0, np.empty((0, 3)), *np.empty((5, 0)), labels=users)
-    >>> sample = make_sample((3, "000120"), run, frame, {"car": "Car", "pedestrian": "Pedestrian"}, min_points=5)
-    >>> sample.name, sample.fates, sample.classes
-    ('000003', ('written', 'too_few_points'), ('Car',))
     """
     labels = frame.labels
     returns = labels.points.sum(axis=1)
@@ -138,8 +121,3 @@ def require_file_name(name: str, whose: str, cure: str) -> None:
         raise SeipError(
             f"{whose} {name!r} cannot give its name to a file; {cure}, of up to 100 letters, digits, '_', '-' and '.'"
         )
-
-
-def shortest(value: float) -> str:
-    """Return the shortest text that reads back as the same float64, and zero without a sign."""
-    return repr(float(value) + 0.0)

@@ -3,23 +3,18 @@
 from __future__ import annotations
 
 import math
-from bisect import bisect_right
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import pairwise
-from typing import Any, Literal
+from typing import Literal
 
 from ...choosing.placement.returns_summary import returns_text
-from ...storage.json_dataclass import as_json
 from ..pictures.drawing import percent
 
 SCHEMA = "seip-network/3"
 
 PROVEN = 1e-9
 """Gap up to which a network is proven optimal: smaller differences are rounding, as in `problem.TIE_TOLERANCE`."""
-COVERAGE_STEPS, RETURNS_STEPS = (0.2, 0.4, 0.6, 0.8), (1.0, 5.0, 20.0, 100.0)
-"""Coverages, and typical returns, at which a site gets the next of `SHARE_COLOURS`."""
 _ORDER = ("equipped", "without sensor", "failed")
 
 
@@ -137,31 +132,12 @@ def network_gap(criterion: Literal["road", "returns"], value: float, bound: floa
     return max(0.0, bound / value - 1.0) if value > 0 else math.inf if bound > 0 else 0.0
 
 
-def network_json(record: NetworkRecord) -> dict[str, Any]:
-    """Return a record as a JSON value with its schema."""
-    return {"schema": SCHEMA, **as_json(record)}
+def ranked_sites(record: NetworkRecord) -> list[tuple[NetworkSite, float | None]]:
+    """Return the sites with their gains, by falling gain; those without sensor and failed ones follow.
 
-
-@dataclass(frozen=True)
-class RankedSite:
-    """Site with its number in the order, from 1, and its gain.
-
-    ``gain`` is that of the criterion for $1,000 spent at the site, times its weight over the mean weight; None if no
+    A gain is that of the criterion for $1,000 spent at the site, times its weight over the mean weight; None if no
     money is spent there.
     """
-
-    number: int
-    site: NetworkSite
-    gain: float | None
-
-    @property
-    def rank(self) -> int | None:
-        """Rank by gain per dollar; None if no money is spent at the site."""
-        return None if self.gain is None else self.number
-
-
-def ranked_sites(record: NetworkRecord) -> tuple[RankedSite, ...]:
-    """Return the sites by falling gain per dollar; those without money, without sensor and failed ones follow."""
     weights = [site.weight for site in record.sites if site.status != "failed"]
     mean = math.fsum(weights) / len(weights) if weights else 0.0
     rows: list[tuple[NetworkSite, float | None]] = []
@@ -169,8 +145,7 @@ def ranked_sites(record: NetworkRecord) -> tuple[RankedSite, ...]:
         paid = site.status == "equipped" and site.price_usd > 0
         relative = site.weight / mean if mean > 0 else 1.0
         rows.append((site, relative * site.value / site.price_usd * 1000.0 if paid else None))
-    rows.sort(key=lambda row: (_ORDER.index(row[0].status), row[1] is None, -(row[1] or 0.0)))
-    return tuple(RankedSite(number, *row) for number, row in enumerate(rows, start=1))
+    return sorted(rows, key=lambda row: (_ORDER.index(row[0].status), row[1] is None, -(row[1] or 0.0)))
 
 
 def sensors_text(sensors: Sequence[NetworkSensor], names: Mapping[str, str]) -> str:
@@ -184,33 +159,8 @@ def outcome(record: NetworkRecord, value: float) -> str:
     return percent(value) if record.criterion == "road" else returns_text(math.expm1(value))
 
 
-def result(record: NetworkRecord, site: NetworkSite) -> str:
-    """Return the result of a site: the road seen, or the typical number of returns."""
-    return percent(site.coverage) if record.criterion == "road" else outcome(record, site.value)
-
-
 def gain_text(record: NetworkRecord, gain: float | None) -> str:
     """Return a gain per $1,000 in percentage points, or as the percentage by which 1 + typical returns grows."""
     if gain is None:
         return "–"
     return f"{gain:.2%}".replace("%", " points") if record.criterion == "road" else f"{math.expm1(min(gain, 50)):.1%}"
-
-
-def level(record: NetworkRecord, site: NetworkSite) -> int:
-    """Return the index of a site's colour among `SHARE_COLOURS`."""
-    if record.criterion == "road":
-        return bisect_right(COVERAGE_STEPS, site.coverage)
-    return bisect_right(RETURNS_STEPS, math.expm1(site.value))
-
-
-def level_words(record: NetworkRecord) -> tuple[str, ...]:
-    """Return what each of `SHARE_COLOURS` means."""
-    road = record.criterion == "road"
-    steps = [f"{step:.0%}" if road else f"{step:g}" for step in (COVERAGE_STEPS if road else RETURNS_STEPS)]
-    between = [f"{low.removesuffix('%')}–{high}" for low, high in pairwise(steps)]
-    return (f"< {steps[0]}", *between, f"≥ {steps[-1]}")
-
-
-def colour_title(record: NetworkRecord) -> str:
-    """Return what the colours of sites show."""
-    return "Road seen" if record.criterion == "road" else "Typical returns from a road user"

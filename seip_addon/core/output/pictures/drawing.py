@@ -1,4 +1,4 @@
-"""Elements shared by pictures: sensors with labels, title, PNG output."""
+"""Elements shared by pictures: sensors with labels, title, PNG output; and the style of all charts."""
 
 import io
 import os
@@ -9,14 +9,18 @@ from functools import cache
 from typing import Any, Literal
 
 import numpy as np
+import shapely
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.font_manager import FontProperties, findfont, get_font
 from matplotlib.ft2font import FT2Font, LoadFlags
-from matplotlib.patches import Rectangle
+from matplotlib.patches import PathPatch, Rectangle
+from matplotlib.path import Path
 from PIL import Image
+from shapely.geometry.base import BaseGeometry
 
 from ...base.arrays import Boolean, Float
 from ...base.counts import counted, round_number
@@ -24,7 +28,7 @@ from ...choosing.placement.deployment import Deployment, price_text
 from ...site.site import Site
 from ...storage.files import whole_file
 from .labels import place_callouts
-from .palette import INK, PAPER, SOFT_INK
+from .palette import INK, PAPER, SERIES_COLOURS, SOFT_INK
 
 Style = dict[str, Any]
 """Keyword arguments of matplotlib."""
@@ -44,6 +48,9 @@ MEASURED_SIZE = 20.0  # points, at which the widths of texts are measured
 SEPARATOR = "  ·  "
 SCALE_SIZE = 9.0  # points
 CORNER_ORDER = 6.0  # drawing order of scale and arrow: over the map and under its sensors
+SERIES_MARKERS = ("o", "s", "^", "D", "v", "P", "X")  # one more than colours, so that pairs repeat only after 42 series
+DASHED = (0, (4, 2))
+GRID_COLOUR, FAINT_COLOUR = "#e3e6e8", "#c3c9ce"
 Window = tuple[float, float, float, float]
 """Left, bottom, right and top of a part of the plane, metres."""
 
@@ -66,18 +73,6 @@ def as_png(figure: Figure) -> bytes:
     """Return a figure as PNG; the same figure gives the same bytes.
 
     A palette of the 256 colours that stand for all others makes a file a third to a fifth as large.
-
-    Examples
-    --------
-    A car of 4.5 by 1.8 m in the middle of a page of 4 by 3 inches:
-
-    >>> page = new_page((4.0, 3.0), dpi=50.0)
-    >>> axes = add_axes(page, 0.2, 0.2, 3.6, 2.6)
-    >>> _ = axes.set(xlim=(-9, 9), ylim=(-6.5, 6.5))
-    >>> draw_polygons(axes, box_corners(np.array([[0.0, 0.0, 4.5, 1.8, 0.0]])), facecolor="black")
-    >>> picture = Image.open(io.BytesIO(as_png(page)))
-    >>> picture.size, picture.convert("L").getpixel((100, 75))
-    ((200, 150), 0)
     """
     drawn = io.BytesIO()
     with warnings.catch_warnings():
@@ -103,6 +98,15 @@ def box_corners(boxes: Float) -> Float:
 def draw_polygons(axes: Axes, polygons: Iterable[Float], **style: Any) -> None:  # noqa: ANN401 - matplotlib's own
     """Draw polygons by their corners, (k, 2) each; the limits of the axes stay."""
     axes.add_collection(PolyCollection(list(polygons), **style), autolim=False)
+
+
+def draw_area(axes: Axes, area: BaseGeometry, **style: Any) -> None:  # noqa: ANN401 - matplotlib's own
+    """Draw a polygon with its holes, or several."""
+    polygons = [part for part in shapely.get_parts(area) if part.geom_type == "Polygon" and not part.is_empty]
+    rings = [ring for part in polygons for ring in (part.exterior, *part.interiors)]
+    if rings:
+        path = Path.make_compound_path(*(Path(np.asarray(ring.coords)[:, :2], closed=True) for ring in rings))
+        axes.add_patch(PathPatch(path, **style))
 
 
 def window_around(bounds: Iterable[float], margin: float, shapes: tuple[float, float] = (0.0, np.inf)) -> Window:
@@ -359,3 +363,75 @@ def corner_boxes(window: Window, inch: float, longest: float = 2.0) -> list[Wind
     scale = (x, y, x + (round_number(longest * inch) + 0.55 * inch), y + 0.52 * inch)
     x, y = right - 0.62 * inch, top - 0.92 * inch
     return [scale, (x, y, x + 0.48 * inch, y + 0.8 * inch)]
+
+
+def colour(row: int) -> str:
+    """Return the colour of a series."""
+    return SERIES_COLOURS[row % len(SERIES_COLOURS)]
+
+
+def mark(row: int) -> str:
+    """Return the marker of a series."""
+    return SERIES_MARKERS[row % len(SERIES_MARKERS)]
+
+
+def new_figure(
+    width: float, height: float, panels: int = 1, *, dpi: int = 160, sharey: bool = False
+) -> tuple[Figure, Sequence[Axes]]:
+    """Return a figure, ``width`` by ``height`` inches, with panels side by side."""
+    figure = new_page((width, height), dpi, layout="constrained")
+    return figure, list(figure.subplots(1, panels, sharey=sharey, squeeze=False)[0])
+
+
+def limits_around(bounds: Window, margin: float) -> tuple[dict[str, Any], float]:
+    """Return the limits of a plan around (left, bottom, right, top), with a relative margin, and its shape.
+
+    The shape is how many times as high as wide it is.
+    """
+    left, bottom, right, top = bounds
+    left, bottom, right, top = window_around(bounds, margin * max(right - left, top - bottom))
+    limits = {"xlim": (left, right), "ylim": (bottom, top), "aspect": "equal"}
+    return limits, (top - bottom) / (right - left)
+
+
+def style_axes(panel: Axes, x: str = "", y: str = "", grid: Literal["both", "x", "y"] = "both") -> None:
+    """Label the axes, and draw grid, ticks and borders as in all charts; empty labels are left out."""
+    if x:
+        panel.set_xlabel(x, color=INK)
+    if y:
+        panel.set_ylabel(y, color=INK)
+    panel.grid(axis=grid, color=GRID_COLOUR, linewidth=0.8)
+    panel.set_axisbelow(True)
+    panel.tick_params(which="both", colors=SOFT_INK)
+    for side in ("top", "right"):
+        panel.spines[side].set_visible(False)
+
+
+def set_title(figure: Figure, title: str) -> None:
+    """Write the title above all panels."""
+    figure.suptitle(title, color=INK, fontsize=12, parse_math=False)
+
+
+def add_legend(figure: Figure, panels: Sequence[Axes], columns: int | None = None) -> None:
+    """Write one legend of the panels' entries below all panels, in the number of columns that fit."""
+    handles = [handle for panel in panels for handle in panel.get_legend_handles_labels()[0]]
+    labels = [str(handle.get_label()) for handle in handles]
+    if columns is None:
+        widths, room = [0.6 + 0.07 * len(label) for label in labels], figure.get_figwidth()  # inches, about
+        columns = len(labels) if sum(widths) < room else max(1, int(room // max(widths)))
+    plain_legend(figure, handles, labels, loc="outside lower center", ncols=columns)
+
+
+def plain_legend(figure: Figure, handles: Sequence[Artist], labels: Sequence[str], **style: Any) -> None:  # noqa: ANN401 -- as above
+    """Write a legend without a frame whose labels are never taken for formulas."""
+    legend = figure.legend(handles, labels, **{"frameon": False, "fontsize": 9} | style)
+    for text in legend.get_texts():
+        text.set_parse_math(False)
+
+
+def save_chart(path: str | os.PathLike[str], figure: Figure, title: str, panels: Sequence[Axes] = ()) -> None:
+    """Write the title and, if panels are given, their legend, and save the chart as PNG."""
+    if panels:
+        add_legend(figure, panels)
+    set_title(figure, title)
+    save_png(path, figure)

@@ -10,7 +10,6 @@ from matplotlib.patches import Rectangle
 
 from ...choosing.placement.deployment import Deployment
 from ...site.site import Site
-from .colours import Legend
 from .drawing import (
     ATTRIBUTION_SIZE,
     NOTE_PAPER,
@@ -24,7 +23,7 @@ from .drawing import (
     save_png,
     text_width,
 )
-from .palette import INK
+from .palette import INK, Legend
 from .viewpoint import Sight
 
 DPI = 160

@@ -1,54 +1,57 @@
 """The plan of a site: map, title and legend with the sensors, shares of the road, and what lines and marks mean."""
 
-import os
+import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
 import shapely
+from matplotlib import patheffects
 from matplotlib.axes import Axes
-from matplotlib.colors import Normalize
+from matplotlib.colors import LinearSegmentedColormap, Normalize
 from matplotlib.figure import Figure
-from matplotlib.patches import Rectangle
+from matplotlib.patches import Rectangle, Wedge
 from shapely.geometry.base import BaseGeometry
 
+from ...base.arrays import Float
 from ...base.counts import counted
 from ...choosing.placement.deployment import Deployment
-from ...site.scene_geometry import ASSUMED, FROM_MAP, OTHER_LEVELS, NamedArea, SceneGeometry
+from ...geometry.plan import closed, outline
+from ...site.scene_geometry import ASSUMED, FROM_MAP, OTHER_LEVELS, Mesh, NamedArea, SceneGeometry
 from ...site.site import Site
-from .colours import of_placement
+from ...site.targets import target_squares
 from .drawing import (
+    MARK_RADIUS,
     SENSOR_MARK,
     Style,
     Window,
     add_axes,
     corner_boxes,
     credits_of,
+    draw_area,
     draw_corners,
+    draw_polygons,
     draw_sensors,
     heading_of,
+    is_writable,
     markers_of,
     new_page,
     percent,
-    save_png,
+    text_width,
     window_around,
     wrapped,
 )
-from .palette import FORBIDDEN, INK, MANDATORY, SOFT_INK, WEIGHTED
-from .plan_map import (
-    ASSUMED_HEIGHT,
-    ASSUMED_MARK,
-    HEIGHT_CMAP,
-    OTHER_ROAD,
-    POLE_MARK,
-    SENSOR,
-    SIDEWALK_MARK,
-    MapContent,
-    draw_map,
-    draw_street_names,
-    map_content,
-    mark_boxes,
+from .palette import (
+    ASSUMED_POLE_COLOUR,
+    FORBIDDEN,
+    INK,
+    MANDATORY,
+    PAPER,
+    POLE_COLOUR,
+    SOFT_INK,
+    WEIGHTED,
+    of_placement,
 )
 
 DPI = 160
@@ -72,19 +75,29 @@ ASIDE: Style = {"size": SMALL, "color": SOFT_INK}
 Sign = Callable[[Axes, float, float], object]
 """Draws a sign into axes in inches, at the left end and the middle of a row's first line."""
 
+ARROW_LENGTH, WEDGE_LENGTH = 0.34, 0.5  # inches
+LAND, PAVEMENT, ROAD, KERB = "#edefe9", "#e2dacb", "#dcdfe3", "#8f949a"
+MAX_GAP = 0.06  # metres
+MIN_PLAN_AREA = 1e-6  # square metres in plan, below which a triangle is a wall's
+NAME_SIZE = 9.5  # points, of the names of streets
+MIN_NAME_ROOM = 1.15  # length of a street on the map, in lengths of its name, from which on it is named
+NAME_SHIFTS = (0.0, 0.4, -0.4, 0.8, -0.8)  # of the name along its street, in shares of the room on each side
 
-def save_plan_view(
-    path: str | os.PathLike[str],
-    geometry: SceneGeometry,
-    site: Site,
-    deployment: Deployment,
-    notes: Sequence[str] = (),
-    *,
-    created: str = "",
-) -> None:
-    """Draw the site with its candidates, the chosen sensors and what they see, as PNG.
+HEIGHT_CMAP = LinearSegmentedColormap.from_list("heights", ("#d2d0c4", "#8b9285", "#4b5350"))
+SIDEWALK_MARK: Style = {"linestyle": "none", "marker": "o", "markersize": 2.6, "mfc": PAPER, "mec": INK, "mew": 0.5}
+ASSUMED_HEIGHT: Style = {"facecolor": "none", "edgecolor": "#c9cdc4", "hatch": "\\\\\\", "linewidth": 0.4}
+OTHER_ROAD: Style = {"facecolor": "#d6d9d8", "edgecolor": "#b4b9ba", "linewidth": 0.4}
+"""A road on another level than the studied one."""
+POLE_MARK: Style = {"linestyle": "none", "marker": "D", "markersize": 3.8, "mfc": POLE_COLOUR, "mec": INK, "mew": 0.6}
+ASSUMED_MARK: Style = POLE_MARK | {"mfc": PAPER, "mec": ASSUMED_POLE_COLOUR, "mew": 0.9}
 
-    The same arguments give the same bytes.
+SURFACE, EDGE, TARGET, OBSTACLE, BORDER, CANDIDATE, TEXT, SENSOR = range(8)
+
+
+def draw_plan(
+    geometry: SceneGeometry, site: Site, deployment: Deployment, notes: Sequence[str] = (), *, created: str = ""
+) -> Figure:
+    """Draw the site with its candidates, the chosen sensors and what they see.
 
     Parameters
     ----------
@@ -93,34 +106,34 @@ def save_plan_view(
     created : str
         Time of the placement (ISO 8601), whose date the plan carries.
     """
-    save_png(path, draw_plan(geometry, site, deployment, notes, created=created))
-
-
-def draw_plan(
-    geometry: SceneGeometry, site: Site, deployment: Deployment, notes: Sequence[str] = (), *, created: str = ""
-) -> Figure:
-    """Return the plan as a figure."""
     sensors = np.array([sensor.xyz[:2] for sensor in deployment.sensors]).reshape(-1, 2)
-    shown = shapely.union_all([site.region, *shapely.points(sensors)])
-    window, map_height = _window(shown)
-    content = map_content(geometry, site, deployment, window)
-    heading, legend = heading_of(site, deployment, MAP_WIDTH), PlanLegend(content, notes)
+    window, map_height = _window(shapely.union_all([site.region, *shapely.points(sensors)]))
+    shown, inch = shapely.box(*window), (window[2] - window[0]) / MAP_WIDTH
+    obstacles = _obstacles(geometry.occluders, shown)
+    above = _above_road(site, obstacles)
+    heights = Normalize(0.0, 5.0 * math.ceil(max(10.0, above.max(initial=0.0)) / 5.0))
+    heading, legend = heading_of(site, deployment, MAP_WIDTH), _Legend(geometry, site, deployment, heights, notes)
     size = (MAP_WIDTH + 2 * MARGIN, heading.height + map_height + legend.height + 2 * MARGIN)
     figure = new_page(size, DPI)
     heading.draw(figure, MARGIN)
     plan = add_axes(figure, MARGIN, legend.height + 2 * MARGIN, MAP_WIDTH, map_height, window)
-    draw_map(plan, content, window, MAP_WIDTH)
-    inch = (window[2] - window[0]) / MAP_WIDTH
+    plan.set(facecolor=LAND)
+    _draw_surfaces(plan, geometry, shown)
+    seen, squares = of_placement(deployment), target_squares(site.targets)[:, :, :2]
+    plain: Style = {"edgecolors": "none", "antialiaseds": False}
+    draw_polygons(plan, squares, facecolors=np.array(seen.colours)[seen.of], zorder=TARGET, **plain)
+    # Below the coverage: what a tree or a bridge covers of the studied road is seen through it, under its outline.
+    draw_polygons(plan, obstacles[:, :, :2], facecolors=HEIGHT_CMAP(heights(above)), zorder=TARGET - 0.5, **plain)
+    draw_area(plan, outline(obstacles), facecolor="none", edgecolor="#3d4542", linewidth=0.5, zorder=OBSTACLE)
+    for mesh in geometry.occluders:
+        if mesh.height_assumed:
+            draw_area(plan, _footprint(mesh, shown), **ASSUMED_HEIGHT, zorder=OBSTACLE)
+    _draw_areas(plan, geometry, site.region)
+    _draw_candidates(plan, geometry, site)
+    _draw_headings(plan, deployment, inch)
     taken = draw_corners(plan, credits_of(site, created))
-    names = draw_street_names(plan, geometry, window, MAP_WIDTH, [*taken, *mark_boxes(sensors, inch)])
-    draw_sensors(
-        plan,
-        deployment,
-        sensors,
-        site.targets.xyz[:, :2],
-        zorder=SENSOR,
-        taken=[*taken, *names],
-    )
+    taken += _draw_street_names(plan, geometry, window, [*taken, *_mark_boxes(sensors, inch)])
+    draw_sensors(plan, deployment, sensors, site.targets.xyz[:, :2], zorder=SENSOR, taken=taken)
     legend.draw(add_axes(figure, MARGIN, MARGIN, MAP_WIDTH, legend.height))
     return figure
 
@@ -143,23 +156,147 @@ def _window(shown: BaseGeometry) -> tuple[Window, float]:
     return windows[0], map_height
 
 
+def _draw_street_names(axes: Axes, geometry: SceneGeometry, window: Window, taken: Sequence[Window]) -> list[Window]:
+    """Write the names of streets along them where they fit, off boxes that are taken, and return their own boxes.
+
+    Names with letters that the type lacks are left out.
+    """
+    inch = (window[2] - window[0]) / MAP_WIDTH
+    boxes: list[Window] = []
+    for place in geometry.places:
+        if place.crossing or not is_writable(place.name):
+            continue
+        parts = [part for part in shapely.get_parts(place.polygon) if part.area > 0]
+        pairs = [(part, cut) for part in parts for cut in shapely.get_parts(part.intersection(shapely.box(*window)))]
+        if not pairs:
+            continue
+        whole, shown = max(pairs, key=lambda pair: float(pair[1].area))
+        along = _direction(whole)
+        reach = shapely.get_coordinates(shown) @ along
+        middle = np.array(shown.centroid.coords[0])
+        length = text_width(place.name, NAME_SIZE) * inch
+        spare = (float(np.ptp(reach)) - MIN_NAME_ROOM * length) / 2
+        half = np.abs(along) * length / 2 + NAME_SIZE / 72 * inch * 0.7
+        tried = [middle + share * max(spare, 0.0) * along for share in NAME_SHIFTS]
+        others = shapely.box(*np.reshape([*taken, *boxes], (-1, 4)).T)
+        free = [at for at in tried if not shapely.box(*(at - half), *(at + half)).intersects(others).any()]
+        if spare < 0 or not free:
+            continue
+        angle = (math.degrees(math.atan2(along[1], along[0])) + 90.0) % 180.0 - 90.0
+        halo = [patheffects.withStroke(linewidth=2.6, foreground=PAPER)]
+        style: Style = {"ha": "center", "va": "center", "rotation": angle, "size": NAME_SIZE, "color": INK}
+        x, y = free[0].tolist()
+        style |= {"path_effects": halo, "parse_math": False, "clip_on": True, "zorder": TEXT - 0.5}
+        axes.text(x, y, place.name, **style)
+        boxes.append((*(free[0] - half), *(free[0] + half)))
+    return boxes
+
+
+def _mark_boxes(sensors: Float, inch: float) -> list[Window]:
+    """Return the boxes of the marks of sensors (k, 2), left, bottom, right and top of each."""
+    half = MARK_RADIUS / 72 * inch
+    return [(x - half, y - half, x + half, y + half) for x, y in sensors.tolist()]
+
+
+def _direction(street: BaseGeometry) -> Float:
+    """Return the direction of the longer side of the narrowest rectangle around a street, (2,)."""
+    sides = np.diff(shapely.get_coordinates(shapely.minimum_rotated_rectangle(street)), axis=0)[:2]
+    longer = sides[int(np.argmax(np.hypot(*sides.T)))]
+    along: Float = longer / np.hypot(*longer)
+    return along
+
+
+def _draw_surfaces(plan: Axes, geometry: SceneGeometry, shown: BaseGeometry) -> None:
+    others = [_footprint(mesh, shown) for mesh in geometry.ground if mesh.name.startswith(OTHER_LEVELS)]
+    other_roads = closed(shapely.union_all(others), MAX_GAP)
+    draw_area(plan, other_roads, **OTHER_ROAD, zorder=SURFACE)
+    pavement = shapely.intersection(geometry.candidate_areas, shown)
+    draw_area(plan, closed(pavement, MAX_GAP), facecolor=PAVEMENT, edgecolor=KERB, linewidth=0.4, zorder=SURFACE)
+    roads = shapely.union_all([_footprint(mesh, shown) for mesh in geometry.roads])
+    draw_area(plan, closed(roads, MAX_GAP), facecolor=ROAD, edgecolor=KERB, linewidth=0.6, zorder=EDGE)
+
+
+def _footprint(mesh: Mesh, shown: BaseGeometry) -> BaseGeometry:
+    """Return what a mesh covers in plan, near the part that is shown."""
+    near = shapely.intersects(shapely.polygons(mesh.triangles[:, :, :2]), shown)
+    return outline(mesh.triangles[near])
+
+
+def _obstacles(occluders: Sequence[Mesh], shown: BaseGeometry) -> Float:
+    """Return the triangles (n, 3, 3) of obstacles that a part of the plane shows, the highest last."""
+    triangles = np.concatenate([np.empty((0, 3, 3)), *(mesh.triangles for mesh in occluders)])
+    flat = shapely.polygons(triangles[:, :, :2])
+    triangles = triangles[(shapely.area(flat) > MIN_PLAN_AREA) & shapely.intersects(flat, shown)]
+    top = triangles[:, :, 2].max(axis=1)
+    order = np.argsort(top, kind="stable")
+    ordered: Float = triangles[order]
+    return ordered
+
+
+def _above_road(site: Site, triangles: Float) -> Float:
+    """Return the height of the top of each triangle (n, 3, 3) above the road next to it."""
+    targets = site.targets.xyz
+    middles = shapely.points(triangles.mean(axis=1)[:, :2])
+    nearest = shapely.STRtree(shapely.points(targets[:, :2])).nearest(middles)
+    height: Float = triangles[:, :, 2].max(axis=1) - targets[nearest, 2]
+    return height
+
+
+def _draw_areas(plan: Axes, geometry: SceneGeometry, region: BaseGeometry) -> None:
+    draw_area(plan, closed(region, MAX_GAP), facecolor="none", edgecolor=INK, linewidth=1.1, zorder=BORDER)
+    for areas, colour, hatch in (
+        (geometry.forbidden_areas, FORBIDDEN, "////"),
+        (geometry.mandatory_areas, MANDATORY, "...."),
+    ):
+        for area in areas:
+            draw_area(plan, area.polygon, facecolor="none", edgecolor=colour, hatch=hatch, linewidth=0.9, zorder=BORDER)
+    for area in geometry.weighted_regions:
+        draw_area(plan, area.polygon, facecolor="none", edgecolor=PAPER, linewidth=2.8, zorder=BORDER)
+        dashed = {"edgecolor": WEIGHTED, "linewidth": 1.5, "linestyle": (0, (5, 2))}
+        draw_area(plan, area.polygon, facecolor="none", **dashed, zorder=BORDER)
+
+
+def _draw_candidates(plan: Axes, geometry: SceneGeometry, site: Site) -> None:
+    """Draw candidate positions, and assumed poles whether they are candidates or not."""
+    position, on_pole = site.candidates.position, site.candidates.on_pole
+    existing = on_pole & (site.candidates.pole_source != ASSUMED)
+    assumed = np.array([pole.base[:2] for pole in geometry.poles if pole.source == ASSUMED]).reshape(-1, 2)
+    for places, style in (
+        (position[~on_pole], SIDEWALK_MARK),
+        (position[existing], POLE_MARK),
+        (assumed, ASSUMED_MARK),
+    ):
+        plan.plot(places[:, 0], places[:, 1], zorder=CANDIDATE, **style)
+
+
+def _draw_headings(plan: Axes, deployment: Deployment, inch: float) -> None:
+    """Draw an arrow for each sensor with a preferred direction, and a wedge for a limited field of view."""
+    for sensor in deployment.sensors:
+        x, y, _ = sensor.xyz.tolist()
+        if not sensor.model.all_round:
+            yaw, half = math.degrees(sensor.yaw), math.degrees(sensor.model.field_of_view) / 2
+            wedge = Wedge((x, y), WEDGE_LENGTH * inch, yaw - half, yaw + half, facecolor=INK, edgecolor=INK, alpha=0.25)
+            plan.add_patch(wedge).set_zorder(SENSOR - 0.3)
+        if sensor.tilt != 0.0 or not sensor.model.all_round:
+            ahead = (x + ARROW_LENGTH * inch * math.cos(sensor.yaw), y + ARROW_LENGTH * inch * math.sin(sensor.yaw))
+            style = {"arrowstyle": "-|>", "color": INK, "linewidth": 1.6, "shrinkA": 0.0, "shrinkB": 0.0}
+            plan.annotate("", xy=ahead, xytext=(x, y), arrowprops=style, zorder=SENSOR - 0.2)
+
+
 @dataclass(frozen=True, eq=False)
 class _Row:
-    """A part of the legend that stays in one column.
+    """A row of the legend.
 
     Parameters
     ----------
     texts : tuple of (float, float, str, Style)
         Inches from the left and from the first line downwards, text, and style; a position of ``inf`` is the right end.
     height : float, inches
-    joined : bool
-        Whether the next row stays in the same column, as below a heading.
     """
 
     texts: tuple[tuple[float, float, str, Style], ...]
     height: float
     sign: Sign | None = None
-    joined: bool = False
 
     def draw(self, axes: Axes, x: float, y: float) -> None:
         if self.sign is not None:
@@ -169,51 +306,49 @@ class _Row:
             plain["ha"] = "right" if left > COLUMN else "left"
             axes.text(x + min(left, COLUMN), y + down, words, **plain | style)
 
-    def followed_by(self, room: float) -> "_Row":
-        return replace(self, height=self.height + room)
 
-
-class PlanLegend:
+class _Legend:
     """Legend of a plan, `MAP_WIDTH` inches wide, laid out in columns as low as its rows allow; notes come last."""
 
-    def __init__(self, content: MapContent, notes: Sequence[str]) -> None:
-        site, deployment = content.site, content.deployment
+    def __init__(
+        self, geometry: SceneGeometry, site: Site, deployment: Deployment, heights: Normalize, notes: Sequence[str]
+    ) -> None:
         sections = (
             _sensor_rows(deployment),
             _target_rows(site, deployment),
-            _map_rows(content.geometry, site),
-            _height_rows(content),
+            _map_rows(geometry, site),
+            _height_rows(geometry, heights),
             [*([_heading("Notes")] if notes else []), *(_small(note[:1].upper() + note[1:]) for note in notes)],
         )
-        for rows in sections:
-            if len(rows) <= MOST_TOGETHER:
-                rows[:-1] = [replace(row, joined=True) for row in rows[:-1]]
-        self._rows = [row for rows in sections for row in rows]
-        self.height = max(*map(self._tall, range(len(self._rows))), sum(row.height for row in self._rows) / COLUMNS)
-        while len({column for column, _ in self._places()}) > COLUMNS:
+        self._groups: list[list[_Row]] = []  # rows that stay in one column
+        for rows in filter(None, sections):
+            together = len(rows) if len(rows) <= MOST_TOGETHER else 2  # a heading and the row below it
+            self._groups += [rows[:together], *([row] for row in rows[together:])]
+        whole = sum(row.height for group in self._groups for row in group)
+        self.height = max(*(_height(group) for group in self._groups), whole / COLUMNS)
+        while len({column for _, column, _ in self._places()}) > COLUMNS:
             self.height += HEIGHT_STEP
 
     def draw(self, axes: Axes) -> None:
         """Draw all rows into axes of the legend's width and height."""
         axes.axis("off")
         axes.set(xlim=(0.0, MAP_WIDTH), ylim=(self.height, 0.0))
-        for row, (column, y) in zip(self._rows, self._places(), strict=True):
+        for row, column, y in self._places():
             row.draw(axes, column * (COLUMN + COLUMN_GAP), y)
 
-    def _tall(self, start: int) -> float:
-        """Return the height of a row and of all that must stay below it in its column."""
-        row = self._rows[start]
-        return row.height + (self._tall(start + 1) if row.joined and start + 1 < len(self._rows) else 0.0)
-
-    def _places(self) -> list[tuple[int, float]]:
-        """Return the column of each row, and the distance of its first line from the top."""
-        places, column, y, follows = [], 0, 0.0, False
-        for number, row in enumerate(self._rows):
-            if y > 0.0 and not follows and y + self._tall(number) > self.height + 1e-9:
+    def _places(self) -> Iterator[tuple[_Row, int, float]]:
+        """Yield each row with its column, and the distance of its first line from the top."""
+        column, y = 0, 0.0
+        for group in self._groups:
+            if y > 0.0 and y + _height(group) > self.height + 1e-9:
                 column, y = column + 1, 0.0
-            places.append((column, y + 0.12))
-            y, follows = y + row.height, row.joined
-        return places
+            for row in group:
+                yield row, column, y + 0.12
+                y += row.height
+
+
+def _height(rows: Sequence[_Row]) -> float:
+    return sum(row.height for row in reversed(rows))
 
 
 def _sensor_rows(deployment: Deployment) -> list[_Row]:
@@ -229,7 +364,7 @@ def _sensor_rows(deployment: Deployment) -> list[_Row]:
         ]
         sign = partial(_mark, SENSOR_MARK | {"marker": markers[sensor.model.key], "markersize": 8.0, "mew": 0.8})
         rows.append(_Row(tuple(texts), len(names) * LINE + len(below) * SMALL_LINE + 0.04, sign))
-    return [_heading("Sensors", "sees of the road"), *rows[:-1], rows[-1].followed_by(AFTER)] if rows else []
+    return [_heading("Sensors", "sees of the road"), *rows[:-1], _spaced(rows[-1])] if rows else []
 
 
 def _target_rows(site: Site, deployment: Deployment) -> list[_Row]:
@@ -254,19 +389,19 @@ def _map_rows(geometry: SceneGeometry, site: Site) -> list[_Row]:
     for count, mark, words in _positions(geometry, site):
         if count:
             rows.append(_line(words, partial(_mark, mark | {"markersize": mark["markersize"] * 1.4})))
-    return [_heading("Map"), *rows[:-1], rows[-1].followed_by(AFTER)]
+    return [_heading("Map"), *rows[:-1], _spaced(rows[-1])]
 
 
-def _height_rows(content: MapContent) -> list[_Row]:
-    highest = float(content.heights.vmax or 0.0)
+def _height_rows(geometry: SceneGeometry, heights: Normalize) -> list[_Row]:
+    highest = float(heights.vmax or 0.0)
     ticks = tuple(
         (2.2 * share, 0.22, f"{highest * share:g}{unit}", {"ha": align, "size": SMALL})
         for share, align, unit in ((0.0, "left", ""), (0.5, "center", ""), (1.0, "right", " m"))
     )
-    rows = [_heading("Obstacles", "height above the road"), _Row(ticks, 0.44, partial(_ramp, content.heights))]
-    if any(mesh.height_assumed for mesh in content.geometry.occluders):
+    rows = [_heading("Obstacles", "height above the road"), _Row(ticks, 0.44, partial(_ramp, heights))]
+    if any(mesh.height_assumed for mesh in geometry.occluders):
         rows.append(_line("height assumed", partial(_swatch, ASSUMED_HEIGHT)))
-    return [*rows[:-1], rows[-1].followed_by(AFTER)]
+    return [*rows[:-1], _spaced(rows[-1])]
 
 
 def _heading(words: str, aside: str = "") -> _Row:
@@ -277,7 +412,7 @@ def _heading(words: str, aside: str = "") -> _Row:
         axes.plot((x, x + COLUMN), (y + below + 0.14,) * 2, color=SOFT_INK, linewidth=0.6)
 
     texts = [(0.0, n * LINE, line, BOLD | {"size": HEADING_SIZE}) for n, line in enumerate(lines)]
-    return _Row((*texts, (np.inf, 0.0, aside, ASIDE)), HEADING_LINE + below, rule, joined=True)
+    return _Row((*texts, (np.inf, 0.0, aside, ASIDE)), HEADING_LINE + below, rule)
 
 
 def _line(words: str, sign: Sign, share: str = "") -> _Row:
@@ -291,6 +426,11 @@ def _small(words: str) -> _Row:
     lines = wrapped(words, COLUMN, SMALL)
     texts = tuple((0.0, n * SMALL_LINE, line, ASIDE) for n, line in enumerate(lines))
     return _Row(texts, len(lines) * SMALL_LINE + AFTER)
+
+
+def _spaced(row: _Row) -> _Row:
+    """Return the last row of a section, with the room below it."""
+    return replace(row, height=row.height + AFTER)
 
 
 def _mark(style: Style, axes: Axes, x: float, y: float) -> None:

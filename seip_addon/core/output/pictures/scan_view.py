@@ -14,22 +14,31 @@ from shapely.geometry.base import BaseGeometry
 from ...base.counts import counted
 from ...sensing.scans.frame import Frame, Labels
 from ...sensing.scans.sensor import MountedSensor
-from .chart_style import plain_legend
-from .colours import By, cloud_colours, sensor_colour, strength_ramp
 from .drawing import (
     LABEL_SIZE,
     SENSOR_MARK,
     Style,
     add_axes,
     box_corners,
+    draw_area,
     draw_corners,
     draw_polygons,
     new_page,
+    plain_legend,
     save_png,
     window_around,
 )
-from .palette import INK, MAX_INTENSITY, PAPER, SEEN_COLOURS, SOFT_INK
-from .plan_map import draw_area
+from .palette import (
+    INK,
+    MAX_INTENSITY,
+    PAPER,
+    SEEN_COLOURS,
+    SOFT_INK,
+    By,
+    cloud_colours,
+    sensor_colour,
+    strength_ramp,
+)
 
 DPI = 160
 MAP_SIDE, MARGIN, HEAD, FOOT = 8.0, 0.3, 0.95, 0.55  # inches

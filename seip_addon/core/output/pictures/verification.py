@@ -14,8 +14,7 @@ from ...sensing.recordings.comparison import AGREES, FARTHER, NEARER, VEHICLE
 from ...sensing.recordings.verification import Verification
 from ...sensing.scans.sensor import MountedSensor
 from ...site.scene_geometry import SceneGeometry
-from .chart_style import limits_around, new_figure, save_chart
-from .drawing import box_corners, draw_attribution, draw_polygons
+from .drawing import box_corners, draw_attribution, draw_polygons, limits_around, new_figure, save_chart
 from .palette import COMPARED_COLOURS, GONE_COLOUR, INK, NEW_COLOUR, SENSOR_BODY, SOFT_INK, STATIC_COLOUR
 
 _KINDS = {"new": NEW_COLOUR, "gone": GONE_COLOUR, VEHICLE: STATIC_COLOUR}

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,28 +10,19 @@ import shapely
 from matplotlib.colors import ListedColormap
 
 from ...base.arrays import Boolean, Float, Integer
-from ...site.locations import DIRECTIONS, direction
+from ...site.locations import direction
 from ...site.targets import Targets
 from ..pictures.drawing import Style, add_axes, as_png, draw_callouts, draw_corners, new_page, window_around
 from ..pictures.palette import INK, PAPER, SEEN_COLOURS
 from ..results.placement_record import RecordedSensor
 from ..results.site_file import PLACE, WEIGHTED, Area
 
-ARMS = DIRECTIONS[::2]
 MIN_DISTANCE = 0.5  # metres from a centre from which on there is a direction from it
 DPI = 150
 MAP_WIDTH = 7.2  # inches
 MAP_SHAPES = (4.0 / MAP_WIDTH, 8.0 / MAP_WIDTH)  # least and largest height, in widths
 MAP_MARGIN = 6.0  # metres around the road
 NUMBER_SIZE = 10.0  # points
-
-
-@dataclass(frozen=True, eq=False)
-class Centre:
-    """A point (2,), local metres, from which distances and directions are counted, by what it is the centre of."""
-
-    name: str
-    xy: Float
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,13 +69,10 @@ def seen_places(targets: Targets, seen_by: Integer, areas: Sequence[Area]) -> li
 def seen_streets(targets: Targets, seen_by: Integer, areas: Sequence[Area]) -> list[SeenPlace]:
     """Return what is seen of each part of the road, and of all of it at the end.
 
-    Each target belongs to one part: to the first weighted region that contains it, otherwise to the first street, or,
-    if no street is named, to the road towards one side. Areas and shares therefore add up. ``areas`` are weighted
-    regions and streets, without crossings.
+    Each target belongs to one part: to the first weighted region that contains it, otherwise to the first street.
+    Areas and shares therefore add up. ``areas`` are weighted regions and streets, without crossings.
     """
     streets = [(area.name, area.within) for area in areas if area.kind == PLACE]
-    if not streets:
-        streets = list(_arms(targets, centres(targets, areas)))
     weighted = [(f"{area.name} (weighted)", area.within) for area in areas if area.kind == WEIGHTED]
     left = np.ones(len(targets), dtype=bool)
     parts = []
@@ -101,36 +88,16 @@ def _seen(name: str, within: Boolean, targets: Targets, seen_by: Integer) -> See
     return SeenPlace(name, area, float((seen_by[within] > 0).mean()), float((seen_by[within] > 1).mean()))
 
 
-def centres(targets: Targets, areas: Sequence[Area]) -> list[Centre]:
-    """Return the points from which places on the road are counted: the centres of the weighted regions.
+def centres(targets: Targets, areas: Sequence[Area]) -> list[tuple[str, Float]]:
+    """Return the points (2,) from which places on the road are counted, with the names of what they are centres of.
 
-    The weighted region of a site that was built is its junction. Without a weighted region the centre is that of the
-    road to be seen, the mean of its squares.
+    They are the centres of the weighted regions: that of a site that was built is its junction. Without a weighted
+    region the centre is that of the road to be seen, the mean of its squares.
     """
     weighted = [area for area in areas if area.kind == WEIGHTED and area.within.any()]
-    return [Centre(area.name, targets.xyz[area.within, :2].mean(axis=0)) for area in weighted] or [
-        Centre("the road", targets.xyz[:, :2].mean(axis=0))
+    return [(area.name, targets.xyz[area.within, :2].mean(axis=0)) for area in weighted] or [
+        ("the road", targets.xyz[:, :2].mean(axis=0))
     ]
-
-
-def _arms(targets: Targets, origins: Sequence[Centre]) -> Iterator[tuple[str, Boolean]]:
-    """Yield the targets on each side of the nearest centre, without those in weighted regions."""
-    nearest, angle, _ = _from_nearest(origins, targets.xyz)
-    quarter = np.round(angle / (math.pi / 2)).astype(np.int64) % 4
-    for origin, centre in enumerate(origins):
-        for number, name in enumerate(ARMS):
-            within = (nearest == origin) & (quarter == number) & ~targets.central
-            yield f"Road {name} of the centre of {centre.name}", within
-
-
-def _from_nearest(origins: Sequence[Centre], points: Float) -> tuple[Integer, Float, Float]:
-    """Return index of, direction from (radians) and distance from (metres) the centre nearest to each point (n, 3)."""
-    offsets = points[:, None, :2] - np.array([centre.xy for centre in origins])
-    distances = np.hypot(*np.moveaxis(offsets, 2, 0))
-    nearest = distances.argmin(axis=1)
-    rows = np.arange(len(points))
-    x, y = offsets[rows, nearest].T
-    return nearest, np.arctan2(y, x), distances[rows, nearest]
 
 
 def _where(own: Integer, middle: Float, targets: Targets, areas: Sequence[Area]) -> str:
@@ -139,10 +106,11 @@ def _where(own: Integer, middle: Float, targets: Targets, areas: Sequence[Area])
     A page names the only centre before its list of blind spots.
     """
     origins = centres(targets, areas)
-    (nearest,), _, (distance,) = _from_nearest(origins, middle[None])
-    towards = direction(middle[:2] - origins[nearest].xy)
-    away = f"{distance:.0f} m {towards} of" if distance >= MIN_DISTANCE else "at"
-    words = f"{away} the centre" + (f" of {origins[nearest].name}" if len(origins) > 1 else "")
+    name, xy = min(origins, key=lambda centre: float(np.hypot(*(middle[:2] - centre[1]))))
+    offset = middle[:2] - xy
+    distance = float(np.hypot(*offset))
+    away = f"{distance:.0f} m {direction(offset)} of" if distance >= MIN_DISTANCE else "at"
+    words = f"{away} the centre" + (f" of {name}" if len(origins) > 1 else "")
     shares = [(int(area.within[own].sum()), area.name) for area in areas]
     most, name = max(shares, key=lambda one: one[0], default=(0, ""))
     if 2 * most < len(own):

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import io
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from PIL import Image
 
-from ...base.arrays import Boolean, Integer
+from ...base.arrays import Integer
 from ...base.errors import SeipError
 from ...geometry.geo_reference import GeoReference
 from ..results.file_names import (
@@ -21,10 +19,9 @@ from ..results.file_names import (
     VERIFICATION_FOLDER,
     VERIFICATION_PICTURE,
 )
-from ..results.placement_record import PlacementRecord, RecordedSensor, load_placement
+from ..results.placement_record import PlacementRecord, load_placement
 from ..results.site_file import SiteFile, load_site_file
 from ..results.verification_record import VerificationRecord, load_verification
-from .blind_spots import Centre, centres
 
 PICTURES = ("view.png", "plan.png")
 SAME_PLACE = 0.001
@@ -49,30 +46,14 @@ class Evidence:
     verification: VerificationRecord | None = None
 
     @property
-    def sensors(self) -> tuple[RecordedSensor, ...]:
-        """The sensors, in the order of the rows of `SiteFile.seen`."""
-        return self.record.sensors
-
-    @property
     def seen_by(self) -> Integer:
         """Number of sensors that see each target, (t,) int64."""
-        times: Integer = self.site.seen.sum(axis=0, dtype=np.int64)
-        return times
-
-    @property
-    def seen(self) -> Boolean:
-        """Mask of the targets that some sensor sees, (t,) bool."""
-        return self.seen_by > 0
+        return np.asarray(self.site.seen.sum(axis=0, dtype=np.int64))
 
     @property
     def area(self) -> float:
         """Square metres of road."""
         return len(self.site.targets) * self.site.targets.spacing**2
-
-    @property
-    def centres(self) -> list[Centre]:
-        """Points from which places on the road are counted; see `centres`."""
-        return centres(self.site.targets, self.site.areas)
 
     @property
     def geo_reference(self) -> GeoReference:
@@ -89,8 +70,6 @@ def load_evidence(folder: Path) -> Evidence:
     SeipError
         The folder is missing, holds no placement, or holds files that are damaged or of different placements.
     """
-    if not folder.is_dir():
-        raise SeipError(f"there is no folder {folder}: name the one that `seip place` has written its result to")
     if not (folder / "placement.json").is_file():
         raise SeipError(f"{folder} holds no placement.json: name a folder that `seip place` has written its result to")
     record, site = load_placement(folder / "placement.json"), load_site_file(folder / "site.npz")
@@ -100,11 +79,11 @@ def load_evidence(folder: Path) -> Evidence:
     names = list(PICTURES)
     names += POSE_ERROR_PICTURES if record.request.goal.scenarios.errs else ()
     names += [TRAFFIC_PICTURE] if record.request.goal.scenarios.kind == "traffic" else []
-    pictures = {name: _picture(folder / name) for name in names if (folder / name).is_file()}
+    pictures = {name: (folder / name).read_bytes() for name in names if (folder / name).is_file()}
     verification = _verification(folder / VERIFICATION_FOLDER, record)
-    if verification is not None:
-        path = folder / VERIFICATION_FOLDER / VERIFICATION_PICTURE
-        pictures |= {path.name: _picture(path, "verify the installation again")} if path.is_file() else {}
+    path = folder / VERIFICATION_FOLDER / VERIFICATION_PICTURE
+    if verification is not None and path.is_file():
+        pictures[path.name] = path.read_bytes()
     return Evidence(record, site, pictures, verification)
 
 
@@ -119,13 +98,3 @@ def _verification(folder: Path, record: PlacementRecord) -> VerificationRecord |
         if plan is None or plan.sensor != one.sensor or math.dist(plan.local_m, one.planned_m) > SAME_PLACE:
             raise SeipError(f"{path} is of another placement: verify the installation again, or move {folder} away")
     return found
-
-
-def _picture(path: Path, cure: str = "place the sensors again") -> bytes:
-    try:
-        content = path.read_bytes()
-        with Image.open(io.BytesIO(content), formats=("PNG",)) as picture:
-            picture.load()
-    except (OSError, ValueError, SyntaxError, Image.DecompressionBombError) as error:
-        raise SeipError(f"{path} is damaged or no picture: {cure}") from error
-    return content

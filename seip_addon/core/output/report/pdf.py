@@ -18,8 +18,7 @@ from PIL import Image
 from ...storage.files import whole_file
 from ..pictures.palette import INK, SOFT_INK
 from ..results.file_names import REPORT_FILES
-from .blocks import Block, Bullets, Card, Facts, Paragraph, Picture, Report, Section, Table
-from .html import as_html
+from .blocks import Block, Bullets, Card, Facts, Paragraph, Picture, Report, Table, as_html
 
 MARGIN, TOP, BOTTOM = 50.0, 52.0, 56.0
 BODY, SMALL, CARD_TITLE, LARGE, HEADING, TITLE = 9.5, 8.0, 10.5, 10.5, 14.0, 20.0
@@ -62,10 +61,10 @@ def as_pdf(report: Report) -> bytes:
         if pdf.has_room(add):
             break
     add(pdf)
-    for number, section in enumerate(report.sections):
-        if number == 0:
-            pdf.add_page()
-        _add_section(pdf, section)
+    if report.sections:
+        pdf.add_page()
+    for title, blocks in report.sections.items():
+        _add_section(pdf, title, blocks)
     return bytes(pdf.output())
 
 
@@ -143,26 +142,26 @@ def _add_heading(pdf: _Document, title: str) -> None:
     pdf.text_lines(title, HEADING, style="B")
 
 
-def _add_opening(pdf: _Document, section: Section) -> None:
+def _add_opening(pdf: _Document, title: str, first: Block) -> None:
     """Add the heading of a section and its first block, to see whether they fit on a page together."""
-    _add_heading(pdf, section.title)
+    _add_heading(pdf, title)
     pdf.ln(GAP)
-    _add_block(pdf, section.blocks[0], whole=False)
+    _add_block(pdf, first, whole=False)
 
 
 def _stays_whole(block: Block) -> bool:
     return isinstance(block, Facts | Card) or (isinstance(block, Table) and len(block.rows) <= MOST_TOGETHER)
 
 
-def _add_section(pdf: _Document, section: Section) -> None:
-    first = section.blocks[0]
-    together = _stays_whole(first) or all(isinstance(block, Picture) for block in section.blocks)
-    room = pdf.has_room(partial(_add_opening, section=section)) if together else not pdf.will_page_break(HEADING_ROOM)
+def _add_section(pdf: _Document, title: str, blocks: Sequence[Block]) -> None:
+    opening = partial(_add_opening, title=title, first=blocks[0])
+    together = _stays_whole(blocks[0]) or all(isinstance(block, Picture) for block in blocks)
+    room = pdf.has_room(opening) if together else not pdf.will_page_break(HEADING_ROOM)
     if not room and pdf.y > TOP:
         pdf.add_page()
-    _add_heading(pdf, section.title)
+    _add_heading(pdf, title)
     waiting: list[Picture] = []  # that the rest of the page has no room for
-    for block in section.blocks:
+    for block in blocks:
         if isinstance(block, Picture):
             waiting.append(block)
         else:

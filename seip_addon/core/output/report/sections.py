@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections import Counter
 from collections.abc import Generator, Iterator, Mapping, Sequence
 from pathlib import Path
@@ -13,7 +14,7 @@ from ...base.arrays import Boolean, Float
 from ...base.counts import counted
 from ...base.progress import Progress
 from ...choosing.placement.deployment import BAND, UNRANKED
-from ...choosing.placement.objective import CHOSEN_FOR, MOVED, SAME_PRICE, purpose
+from ...choosing.placement.objective import CHOSEN_FOR, Objective, purpose
 from ...choosing.placement.returns_summary import (
     FEW,
     FEW_RETURNS,
@@ -21,9 +22,10 @@ from ...choosing.placement.returns_summary import (
     SURFACE_SEEN,
     returns_text,
 )
+from ...sensing.lidar.catalogue import load_catalogue
 from ...site.candidates import PAPER_TYPES
 from ..pictures.drawing import percent
-from ..results.answer import Costs, costs_of, sentence
+from ..results.answer import Costs, costs_of, date, dollars, outlook, sentence
 from ..results.file_names import POSE_ERROR_PICTURES, TRAFFIC_PICTURE
 from ..results.geographic_files import LOCATED_FILES
 from ..results.placement_record import RecordedSensor, relevant_warnings
@@ -32,15 +34,13 @@ from ..results.verification_record import (
     RecordedChange,
     change_text,
     cost_text,
-    coverage_rows,
     coverage_text,
     gain_text,
     objects,
     pose_text,
-    signed_points,
     vehicles,
 )
-from .blind_spots import blind_spot_map, blind_spots, seen_places, seen_streets
+from .blind_spots import blind_spot_map, blind_spots, centres, seen_places, seen_streets
 from .blocks import (
     Block,
     Bullets,
@@ -54,22 +54,9 @@ from .blocks import (
 )
 from .evidence import Evidence, load_evidence
 from .pdf import save_report
-from .wording import (
-    date,
-    dollars,
-    in_sentence,
-    limits_of,
-    mounting,
-    named,
-    plain_warning,
-    points,
-    proof,
-    returns_within,
-)
 
 MOST_SPOTS = 8
 LEAST_TILT = 0.05  # degrees, below which a sensor is upright
-MIN_DIFFERENCE = 1e-6  # share of the road by which two coverages differ at least; records have nine digits
 FOR_RETURNS = " for returns from road users"
 POSE_ERRORS = "with errors of"
 """Beginning of the note on the cost of pose errors."""
@@ -167,7 +154,7 @@ def _summary(evidence: Evidence) -> str:
         seen += f" ({span}, as the sensors' range is only known from data sheets)"
     parts = [f"{seen}."]
     if coverage.central is not None:
-        names = ", ".join(centre.name for centre in evidence.centres)
+        names = ", ".join(name for name, _ in centres(evidence.site.targets, evidence.site.areas))
         parts.append(f"Of the most important part ({names}), {percent(coverage.central)} is seen.")
     if record.returns is not None:
         parts += filter(None, [record.returns.verdict()])
@@ -180,14 +167,15 @@ def _summary(evidence: Evidence) -> str:
         )
     least = min(record.crossings, key=lambda one: one.least, default=None)
     if least is not None:
+        name = f"c{least.name[1:]}" if least.name.startswith("Crossing") else least.name  # within a sentence
         parts.append(
             f"A pedestrian in plain view on a crossing returns at least {returns_text(least.least)} points in each "
-            f"revolution (at the worst point of the {in_sentence(least.name)})."
+            f"revolution (at the worst point of the {name})."
         )
     if len(record.sensors) > 1:
         least_left = percent(min(after_failures(evidence.site.seen)))
         parts.append(f"If any one sensor fails, at least {least_left} of the road is still seen.")
-    return " ".join([*parts, proof(evidence)])
+    return " ".join([*parts, outlook(record)])
 
 
 def _plan(evidence: Evidence) -> Iterator[Block]:
@@ -204,22 +192,14 @@ def _verification(evidence: Evidence) -> Iterator[Block]:
         f"The recording “{found.recording}” of the installed sensors was compared with the plan, beam by beam. "
         f"{coverage_text(steps)}"
     )
-    yield Table(
-        ("Coverage", "Seen", "Difference, points"),
-        tuple(
-            (cause[:1].upper() + cause[1:], percent(share), "" if effect is None else signed_points(effect))
-            for cause, share, effect in coverage_rows(steps)
-        ),
-        frozenset({1, 2}),
-    )
     planned = evidence.record.coverage.whole
     differs = f" Settings other than those of the placement, which promised {percent(planned)}, were used."
     yield Paragraph(
-        "Each row includes those above it, and all are computed on the same squares of road. In the recording itself, "
-        f"{percent(steps.returned)} of the squares have a measured point nearby in most turns of the sensors."
+        "Each effect is on top of those before it, and all are computed on the same squares of road. In the recording "
+        f"itself, {percent(steps.returned)} of the squares have a measured point nearby in most turns of the sensors."
         f"{'' if abs(steps.promised - planned) < LEAST_COST else differs}"
     )
-    missing = [sensor.id for sensor in evidence.sensors if sensor.id not in {one.id for one in found.sensors}]
+    missing = [sensor.id for sensor in evidence.record.sensors if sensor.id not in {one.id for one in found.sensors}]
     if missing:
         yield Paragraph(f"The recording does not contain {', '.join(missing)}: the coverage above is without.")
     for one in found.sensors:
@@ -271,14 +251,14 @@ def _sensors(evidence: Evidence, costs: Costs) -> Iterator[Block]:
         f"Heights and coordinates are those of the optical centre. {system} Before work begins, check ownership, "
         "foundations, power and underground lines on site."
     )
-    for sensor, items in zip(evidence.sensors, costs.items, strict=True):
+    for sensor, items in zip(evidence.record.sensors, costs.items, strict=True):
         yield Card(f"{sensor.id}  {sensor.sensor_name}", (Facts(tuple(_sensor_facts(evidence, sensor, items))),))
 
 
 def _sensor_facts(evidence: Evidence, sensor: RecordedSensor, items: Mapping[str, float]) -> Iterator[tuple[str, str]]:
     if sensor.location:
         yield "Location", sensor.location
-    yield "Mounted on", mounting(sensor)
+    yield "Mounted on", _mounting(sensor)
     tilted = abs(sensor.tilt_deg) >= LEAST_TILT
     tilt = f"tilted by {sensor.tilt_deg:.1f}° downwards at the front" if tilted else "upright (tilt 0°)"
     yield "Height, tilt", f"{sensor.height_m:.2f} m above the ground, {tilt}"
@@ -295,7 +275,7 @@ def _sensor_facts(evidence: Evidence, sensor: RecordedSensor, items: Mapping[str
         yield "Altitude", f"{sensor.altitude_m:.1f} m"
     parts = ", ".join(f"{name} {dollars(amount)}" for name, amount in items.items())
     yield "Cost", f"{dollars(sum(items.values()))}: {parts}"
-    alone = f"; {percent(sensor.coverage_marginal)} is seen by no other" if len(evidence.sensors) > 1 else ""
+    alone = f"; {percent(sensor.coverage_marginal)} is seen by no other" if len(evidence.record.sensors) > 1 else ""
     yield "Sees", f"{percent(sensor.coverage_alone)} of the road{alone}"
 
 
@@ -311,11 +291,7 @@ def _costs(costs: Costs) -> Iterator[Block]:
 
 
 def _places(evidence: Evidence) -> Iterator[Block]:
-    record, coverage = evidence.record, evidence.record.coverage
-    yield Paragraph(
-        f"{percent(coverage.whole)} of the road is seen by a sensor, {percent(coverage.seen_twice)} by two or more."
-    )
-    site, returns = evidence.site, {one.name: one.least for one in record.crossings}
+    site, returns = evidence.site, {one.name: one.least for one in evidence.record.crossings}
     parts = seen_streets(site.targets, evidence.seen_by, [one for one in site.areas if one.name not in returns])
     streets = ((one.name, f"{one.area:,.0f}", percent(one.seen), percent(one.seen_twice)) for one in parts)
     yield Table(("Part of the road", "Area, m²", "Seen", "Twice"), tuple(streets), frozenset({1, 2, 3}))
@@ -334,7 +310,7 @@ def _places(evidence: Evidence) -> Iterator[Block]:
 
 
 def _blind_spots(evidence: Evidence) -> Iterator[Block]:
-    spots = blind_spots(evidence.site.targets, evidence.seen, evidence.site.areas)
+    spots = blind_spots(evidence.site.targets, evidence.seen_by > 0, evidence.site.areas)
     if not spots:
         yield Paragraph("There are none: every square of the road is seen.")
         return
@@ -347,7 +323,7 @@ def _blind_spots(evidence: Evidence) -> Iterator[Block]:
         yield Paragraph(SURFACE_SEEN)
     yield Picture(
         blind_spot_map(
-            evidence.site.targets, evidence.seen_by, shown, evidence.sensors, evidence.record.site.attribution
+            evidence.site.targets, evidence.seen_by, shown, evidence.record.sensors, evidence.record.site.attribution
         ),
         "Orange is not seen, light blue seen by one sensor, dark blue by two or more. Triangles are sensors, numbers "
         "the blind spots of the table.",
@@ -362,7 +338,7 @@ def _blind_spots(evidence: Evidence) -> Iterator[Block]:
 
 def _counted_from(evidence: Evidence) -> str:
     """Return the sentence that defines distances and directions of blind spots."""
-    names = [f"“{centre.name}”" for centre in evidence.centres]
+    names = [f"“{name}”" for name, _ in centres(evidence.site.targets, evidence.site.areas)]
     if not evidence.site.targets.central.any():
         origin = "the centre of the road, the mean of all its squares"
     elif len(names) == 1:
@@ -385,51 +361,30 @@ def _located(evidence: Evidence, points: Float, digits: int = 6) -> list[str]:
 
 def _other_choices(evidence: Evidence) -> Iterator[Block]:
     record = evidence.record
-    yield Paragraph(proof(evidence))
-    same_price = _same_price(evidence)
-    elsewhere = (POSE_ERRORS, CHOSEN_FOR, BAND, UNRANKED, FEW, *LOCATED_FILES, *([SAME_PRICE] if same_price else []))
+    yield Paragraph(outlook(record))
+    elsewhere = (POSE_ERRORS, CHOSEN_FOR, BAND, UNRANKED, FEW, *LOCATED_FILES)
     notes = [sentence(note.partition(": the gap is")[0]) for note in record.notes if not note.startswith(elsewhere)]
-    notes += [same_price] if same_price else []
     notes += [] if record.judgement is None else record.judgement.sentences()
     if record.returns is not None and record.judgement is None:
         notes.append(sentence(NOT_BY_DETECTION))
-    notes.append("“Proven” refers to the model: this scene, these sensor models and this criterion.")
+    notes.append(
+        "What is proven of other choices refers to the model: this scene, these sensor models and this criterion."
+    )
     yield Bullets(tuple(notes))
     if len(record.front if record.returns is None else record.returns.front) > 1:
         yield from _front(evidence)
-
-
-def _same_price(evidence: Evidence) -> str:
-    """Return what is proven of the coverage of the cheapest placement, from the table of numbers of sensors, or ""."""
-    record, problem = evidence.record, evidence.site.problem
-    own = [point for point in record.front if point.count == len(record.sensors)]
-    equal = bool(np.ptp(problem.prices[problem.allowed]) == 0) if problem.allowed.any() else False
-    if not record.objective.cheapest or record.objective.status == MOVED or not own or not equal:
-        return ""
-    choice = f"choice of {counted(len(record.sensors), 'sensor')}, at the same price,"
-    more = own[0].coverage - _weighted_share(evidence)
-    if more > MIN_DIFFERENCE:
-        return f"Another {choice} covers {points(more)} more: see the table of numbers of sensors."
-    missed = own[0].missed
-    return f"No other {choice} covers more{f' than {points(missed)} more' if missed else ': this is proven'}."
-
-
-def _weighted_share(evidence: Evidence) -> float:
-    """Return the share of the road that is seen, counted by its weights."""
-    weights = evidence.site.problem.weights
-    return math.fsum(weights[evidence.seen]) / math.fsum(weights)
 
 
 def _front(evidence: Evidence) -> Iterator[Block]:
     """Yield the table of the best placements by number of sensors."""
     record, returns, budget = evidence.record, evidence.record.returns, evidence.record.request.goal.budget
     if returns is None:
-        weighted = ", by its weights" if np.ptp(evidence.site.problem.weights) > 0 else ""
+        weighted = ", by its weights" if np.ptp(evidence.site.weights) > 0 else ""
         measured, head = f"see these shares of the road{weighted}.", "Seen"
         rows = [
             (
                 *(point.count, point.price, percent(point.coverage)),
-                f"at most {points(point.missed)} more" if point.missed else "none sees more",
+                f"at most {_points(point.missed)} more" if point.missed else "none sees more",
             )
             for point in record.front
         ]
@@ -498,10 +453,10 @@ def _trust(evidence: Evidence) -> Iterator[Block]:
         lines.append(f"Types 1 to 3 {PAPER_MODELS} This placement uses {' and '.join(models)}.")
     evidences = {sensor.sensor_name: sensor.evidence for sensor in record.sensors if sensor.sensor not in PAPER_TYPES}
     lines += [f"Range of {name}: {rests_on}." for name, rests_on in evidences.items() if rests_on]
-    lines += [named(sentence(note)) for note in record.notes if note.startswith((BAND, UNRANKED))]
+    lines += [_named(note, names) for note in record.notes if note.startswith((BAND, UNRANKED))]
     chosen = (sensor.sensor for sensor in record.sensors)
     warnings = relevant_warnings(record.warnings, record.request.candidates.sensors, chosen)
-    lines += [plain_warning(warning, names) for warning in warnings]
+    lines += [_named(warning, names) for warning in warnings]
     lines.append("The scene is a model: objects that it lacks do not block the view. Check the positions on site.")
     yield Bullets(tuple(lines))
 
@@ -540,10 +495,10 @@ def _settings(evidence: Evidence) -> Iterator[tuple[str, str]]:
     record = evidence.record
     goal, counts, targets = record.request.goal, record.counts, evidence.site.targets
     if goal.coverage is not None:
-        asked = f"the cheapest sensors that see {percent(goal.coverage)} of the road{limits_of(goal, 'with')}"
+        asked = f"the cheapest sensors that see {percent(goal.coverage)} of the road{_limits_of(goal)}"
     else:
         what = "most of the road seen" if record.returns is None else "most points on road users"
-        asked = f"{what}{limits_of(goal, 'with')}"
+        asked = f"{what}{_limits_of(goal)}"
     chosen_for = purpose(record.notes)
     chosen_for = "" if record.returns is not None and chosen_for == FOR_RETURNS else chosen_for
     yield "Asked for", f"{asked}{f', chosen{chosen_for}' if chosen_for else ''}"
@@ -562,3 +517,33 @@ def _settings(evidence: Evidence) -> Iterator[tuple[str, str]]:
     yield "With", ", ".join(f"{name} {version}" for name, version in record.versions.items())
     for name, value in record.inputs.items():
         yield f"Checksum of {name}", value
+
+
+def _limits_of(goal: Objective) -> str:
+    """Return the limits on a placement, its number of sensors and its price, as the end of a sentence."""
+    count = "" if goal.count is None else f" with at most {counted(goal.count, 'sensor')}"
+    return count if goal.budget is None else f"{count} for at most {dollars(goal.budget)}"
+
+
+def _points(share: float) -> str:
+    """Return a share as percentage points, rounded up."""
+    return f"{math.ceil(share * 1000 - 1e-9) / 10:.1f} percentage points"
+
+
+def returns_within(returns: float, gap: float) -> str:
+    """Return a bound on returns as text, rounded up; the gap is the largest share by which 1 + returns can grow."""
+    most = (1.0 + returns) * (1.0 + gap) - 1.0
+    return f"{math.ceil(most - 1e-9):,}" if most >= 10 else f"{math.ceil(10 * most - 1e-9) / 10:.1f}"
+
+
+def _named(note: str, names: Mapping[str, str]) -> str:
+    """Return a note as a sentence with the names of sensor types in place of their catalogue keys."""
+    known = {**{key: model.name for key, model in load_catalogue().items()}, **names}
+    return re.sub(r"\w+", lambda word: known.get(word[0], word[0]), sentence(note))
+
+
+def _mounting(sensor: RecordedSensor) -> str:
+    """Return what a sensor is mounted on."""
+    if sensor.pose is None:
+        return "moved by hand: check on site"
+    return f"existing pole ({sensor.position})" if sensor.on_pole else f"new post ({sensor.position})"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from datetime import datetime
 from functools import cache
 
 from ...base.counts import counted
@@ -29,10 +30,22 @@ def sentence(text: str) -> str:
     return begun if begun.endswith((".", "!", "?")) else f"{begun}."
 
 
+def dollars(amount: float) -> str:
+    """Return an amount in whole dollars."""
+    return f"${amount:,.0f}"
+
+
+def date(created: str) -> str:
+    """Return the date of a time (ISO 8601), such as 24 November 2026."""
+    when = datetime.fromisoformat(created)
+    months = ("January", "February", "March", "April", "May", "June", "July", "August", "September", "October")
+    return f"{when.day} {(*months, 'November', 'December')[when.month - 1]} {when.year}"
+
+
 def status_text(record: PlacementRecord) -> str:
     """Return quality, price and certificate in a few words: ``94% · $48k · proven``."""
     price = record.price_usd
-    rounded = f"${price / 1000:,.0f}k" if price >= WHOLE_THOUSANDS else f"${price:,.0f}"
+    rounded = f"${price / 1000:,.0f}k" if price >= WHOLE_THOUSANDS else dollars(price)
     more, status = possible_improvement(record), record.objective.status
     unproven = "not proven" if more is None else f"within {more:.1%}"
     certificate = {MOVED: "not optimised", "optimal": "proven"}.get(status, unproven)
@@ -46,11 +59,29 @@ def answer(record: PlacementRecord) -> tuple[str, ...]:
     else:
         typical = f"{_quality(record)} from a road user in each revolution: {record.returns.describe_each()}."
         achieved = " ".join(filter(None, (record.returns.verdict(), typical)))
-    paid = f"${record.price_usd:,.0f} for {counted(len(record.sensors), 'sensor')}"
-    installed = " with installation" if record.installed else f", about ${costs_of(record).total:,.0f} installed"
-    lines = [f"{achieved} {_outlook(record)}", f"{paid}{installed}."]
+    paid = f"{dollars(record.price_usd)} for {counted(len(record.sensors), 'sensor')}"
+    installed = " with installation" if record.installed else f", about {dollars(costs_of(record).total)} installed"
+    lines = [f"{achieved} {outlook(record)}", f"{paid}{installed}."]
     judged = () if record.judgement is None else record.judgement.sentences()
     return tuple(filter(None, (*lines, *judged, recommendation(record))))
+
+
+def outlook(record: PlacementRecord) -> str:
+    """Return how much better the best placement of these candidates could be."""
+    objective = record.objective
+    if objective.status == MOVED:
+        return "This is not an optimised placement: the sensors are evaluated where they stand."
+    what = purpose(record.notes) if record.returns is None else ""  # else the sentence before has said it
+    what += "" if record.judgement is None else " by the criterion"
+    better = "cheaper" if objective.cheapest else "better"
+    if objective.status == "optimal":
+        return f"It is proven that no placement of these candidates is {better}{what}."
+    more = possible_improvement(record)
+    return (
+        "How much better it could be is not known."
+        if more is None
+        else f"At most {more:.1%} {better} is possible{what}."
+    )
 
 
 def recommendation(record: PlacementRecord) -> str:
@@ -86,7 +117,7 @@ def change_text(record: PlacementRecord, previous: PlacementRecord) -> str:
     word = "Better" if now > before else "Worse"
     figures = f"{_quality(record, exact=True)} instead of {_quality(previous, exact=True)}"
     saved = previous.price_usd - record.price_usd
-    price = f", for ${abs(saved):,.0f} {'less' if saved > 0 else 'more'}" if round(saved) else ""
+    price = f", for {dollars(abs(saved))} {'less' if saved > 0 else 'more'}" if round(saved) else ""
     return f"{word} than the previous placement: {figures}{price}."
 
 
@@ -106,24 +137,6 @@ def _quality(record: PlacementRecord, *, exact: bool = False) -> str:
     if record.returns is not None:
         return f"{returns_text(record.returns.typical)} returns"
     return f"{record.coverage.whole:.2%}" if exact else f"{record.coverage.whole:.0%}"
-
-
-def _outlook(record: PlacementRecord) -> str:
-    """Return how much better the best placement of these candidates could be."""
-    objective = record.objective
-    if objective.status == MOVED:
-        return "This is not an optimised placement: the sensors are evaluated where they stand."
-    what = purpose(record.notes) if record.returns is None else ""  # else the sentence before has said it
-    what += "" if record.judgement is None else " by the criterion"
-    better = "cheaper" if objective.cheapest else "better"
-    if objective.status == "optimal":
-        return f"No placement of these candidates is {better}{what}."
-    more = possible_improvement(record)
-    return (
-        "How much better it could be is not known."
-        if more is None
-        else f"At most {more:.1%} {better} is possible{what}."
-    )
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from ...base.arrays import Boolean, Float
-from ...choosing.placement.deployment import Deployment, Sensor
+from ...choosing.placement.deployment import Deployment
 from ...geometry.orientation import degrees, tilt_degrees
 from ...geometry.plan import closed
 from ...site.scene_geometry import NamedArea, SceneGeometry
@@ -63,20 +63,15 @@ class Located:
     region: tuple[shapely.Polygon, ...]
     weighted: tuple[tuple[NamedArea, tuple[shapely.Polygon, ...]], ...]
 
-    @property
-    def sensors(self) -> tuple[Sensor, ...]:
-        """The sensors, in the order of the points."""
-        return self.deployment.sensors
-
     def patches(self) -> Iterator[tuple[list[str], tuple[shapely.Polygon, ...]]]:
         """Yield for each set of sensors, by their labels, the road that these see and no others."""
         squares = np.round(target_squares(self.site.targets)[:, :, :2], METRE_DECIMALS)
-        rows: Boolean = self.deployment.rows.reshape(len(self.sensors), len(squares))
+        rows: Boolean = self.deployment.rows.reshape(-1, len(squares))
         sets, which = np.unique(rows.T, axis=0, return_inverse=True)
         for number in range(len(sets)):
             own = which.ravel() == number
             area = shapely.coverage_union_all(shapely.polygons(squares[own]))
-            seers = [sensor.label for sensor, sees in zip(self.sensors, sets[number], strict=True) if sees]
+            seers = [sensor.label for sensor, sees in zip(self.deployment.sensors, sets[number], strict=True) if sees]
             yield seers, _polygons(self.site, area)
 
 
@@ -123,7 +118,7 @@ def feature(kind: str, shape: str, coordinates: object, **properties: object) ->
 
 
 def _features(placed: Located) -> Iterator[Feature]:
-    for sensor, point in zip(placed.sensors, placed.points.tolist(), strict=True):
+    for sensor, point in zip(placed.deployment.sensors, placed.points.tolist(), strict=True):
         about = {
             "id": sensor.label,
             "sensor": sensor.model.key,
@@ -155,40 +150,37 @@ def _rings(polygon: shapely.Polygon) -> list[list[list[float]]]:
     return [shapely.get_coordinates(ring).tolist() for ring in (polygon.exterior, *polygon.interiors)]
 
 
-def _degrees(site: Site, points: Float) -> Float:
-    """Return longitude and latitude of local points, (n, 2) degrees."""
-    places = site.geographic(points)
-    if places is None:
-        raise ValueError(site.geo_reference.obstacle)
-    return np.round(places[:, :2], DECIMALS)
-
-
 def _polygons(site: Site, area: BaseGeometry) -> tuple[shapely.Polygon, ...]:
     """Return the polygons of an area in plan as longitude and latitude."""
+
+    def located_at(xy: Float) -> Float:
+        places = site.geographic(np.column_stack([xy, np.zeros(len(xy))]))
+        if places is None:
+            raise ValueError(site.geo_reference.obstacle)
+        return np.round(places[:, :2], DECIMALS)
+
     parts = [part for part in shapely.get_parts(area) if part.geom_type == "Polygon" and not part.is_empty]
-    turned = (
-        shapely.transform(part, lambda xy: _degrees(site, np.column_stack([xy, np.zeros(len(xy))]))) for part in parts
-    )
-    return tuple(shapely.orient_polygons(part, exterior_cw=False) for part in turned)
+    return tuple(shapely.orient_polygons(shapely.transform(part, located_at), exterior_cw=False) for part in parts)
 
 
 def save_kml(path: str | os.PathLike[str], placed: Located) -> None:
     """Write a document with the sensors at their heights above the ground, and the rest on it."""
     root = ET.Element("kml", {"xmlns": NAMESPACE})
-    document = ET.SubElement(root, "Document")
-    _text(document, "name", placed.site.name)
+    document = _add(root, "Document")
+    _add(document, "name", placed.site.name)
     if placed.site.attribution:
-        _text(document, "description", escape("\n".join(placed.site.attribution), quote=False))  # shown as HTML
+        _add(document, "description", escape("\n".join(placed.site.attribution), quote=False))  # shown as HTML
     for name, (line, fill, opacity) in KML_STYLES.items():
-        style = ET.SubElement(document, "Style", {"id": name})
-        drawn = ET.SubElement(style, "LineStyle")
-        _text(drawn, "color", _kml_colour(line or fill, 0xFF if line else 0))
-        _text(drawn, "width", "2")
-        filled = ET.SubElement(style, "PolyStyle")
-        _text(filled, "color", _kml_colour(fill or line, opacity))
-        _text(filled, "fill", str(int(bool(fill))))
-    sensors = _folder(document, "Sensors")
-    for sensor, (longitude, latitude, _) in zip(placed.sensors, placed.points.tolist(), strict=True):
+        style = _add(document, "Style", id=name)
+        drawn = _add(style, "LineStyle")
+        _add(drawn, "color", _kml_colour(line or fill, 0xFF if line else 0))
+        _add(drawn, "width", "2")
+        filled = _add(style, "PolyStyle")
+        _add(filled, "color", _kml_colour(fill or line, opacity))
+        _add(filled, "fill", str(int(bool(fill))))
+    sensors, areas, coverage = (_add(document, "Folder") for _ in range(3))
+    _add(sensors, "name", "Sensors")
+    for sensor, (longitude, latitude, _) in zip(placed.deployment.sensors, placed.points.tolist(), strict=True):
         about = {
             "sensor": sensor.model.key,
             "position": sensor.position_name,
@@ -198,15 +190,15 @@ def save_kml(path: str | os.PathLike[str], placed: Located) -> None:
             "price_usd": f"{sensor.price:.2f}",
         }
         words = escape(f"{sensor.model.name}, {sensor.height:.2f} m above the ground{sensor.turned}", quote=False)
-        point = ET.SubElement(_placemark(sensors, sensor.label, "description", words, about), "Point")
-        _text(point, "extrude", "1")
-        _text(point, "altitudeMode", "relativeToGround")
-        _text(point, "coordinates", f"{longitude:.8f},{latitude:.8f},{sensor.height:.3f}")
-    areas = _folder(document, "Areas")
+        point = _add(_placemark(sensors, sensor.label, "description", words, about), "Point")
+        _add(point, "extrude", "1")
+        _add(point, "altitudeMode", "relativeToGround")
+        _add(point, "coordinates", f"{longitude:.8f},{latitude:.8f},{sensor.height:.3f}")
+    _add(areas, "name", "Areas")
     _area(areas, "Region of interest", "region", placed.region, {})
     for area, polygons in placed.weighted:
         _area(areas, area.name, "weighted", polygons, {"weight": f"{area.weight:g}"})
-    coverage = _folder(document, "Coverage")
+    _add(coverage, "name", "Coverage")
     for seers, polygons in placed.patches():
         title = f"Seen by {', '.join(seers)}" if seers else "Not seen"
         seen = ("unseen", "seen", "seen-twice")[min(len(seers), 2)]
@@ -219,23 +211,23 @@ def save_kml(path: str | os.PathLike[str], placed: Located) -> None:
 def _area(
     folder: ET.Element, name: str, style: str, polygons: Sequence[shapely.Polygon], data: Mapping[str, str]
 ) -> None:
-    several = ET.SubElement(_placemark(folder, name, "styleUrl", f"#{style}", data), "MultiGeometry")
+    several = _add(_placemark(folder, name, "styleUrl", f"#{style}", data), "MultiGeometry")
     for polygon in polygons:
-        element = ET.SubElement(several, "Polygon")
+        element = _add(several, "Polygon")
         for number, ring in enumerate(_rings(polygon)):
-            border = ET.SubElement(element, "innerBoundaryIs" if number else "outerBoundaryIs")
+            border = _add(element, "innerBoundaryIs" if number else "outerBoundaryIs")
             corners = " ".join(f"{longitude:.8f},{latitude:.8f}" for longitude, latitude in ring)
-            _text(ET.SubElement(border, "LinearRing"), "coordinates", corners)
+            _add(_add(border, "LinearRing"), "coordinates", corners)
 
 
 def _placemark(folder: ET.Element, name: str, tag: str, text: str, data: Mapping[str, str]) -> ET.Element:
     """Return a new placemark with its name, one more text, and named values."""
-    placemark = ET.SubElement(folder, "Placemark")
-    _text(placemark, "name", name)
-    _text(placemark, tag, text)
-    extended = ET.SubElement(placemark, "ExtendedData")
+    placemark = _add(folder, "Placemark")
+    _add(placemark, "name", name)
+    _add(placemark, tag, text)
+    extended = _add(placemark, "ExtendedData")
     for key, value in data.items():
-        _text(ET.SubElement(extended, "Data", {"name": key}), "value", value)
+        _add(_add(extended, "Data", name=key), "value", value)
     return placemark
 
 
@@ -245,11 +237,7 @@ def _kml_colour(colour: str, opacity: int) -> str:
     return f"{opacity:02x}{blue}{green}{red}".lower()
 
 
-def _folder(document: ET.Element, name: str) -> ET.Element:
-    folder = ET.SubElement(document, "Folder")
-    _text(folder, "name", name)
-    return folder
-
-
-def _text(parent: ET.Element, tag: str, text: str) -> None:
-    ET.SubElement(parent, tag).text = _NO_XML.sub("\N{REPLACEMENT CHARACTER}", text)
+def _add(parent: ET.Element, tag: str, text: str = "", **attributes: str) -> ET.Element:
+    element = ET.SubElement(parent, tag, attributes)
+    element.text = _NO_XML.sub("\N{REPLACEMENT CHARACTER}", text)
+    return element

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 
-from ...base.arrays import Boolean
+from ...base.arrays import Boolean, Float
 from ...choosing.placement.objective import Solution
 from ...choosing.placement.problem import PlacementConstraints
 from ...site.scene_geometry import SceneGeometry
@@ -44,17 +44,17 @@ class Area:
 
 @dataclass(frozen=True, eq=False)
 class SiteFile:
-    """Targets, named areas, visibility from each chosen sensor, and the problem that was solved.
+    """Part of ``site.npz`` that reports are made of: targets, named areas, and visibility from each chosen sensor.
 
-    ``seen`` (k, t) is in the order of the record; ``key`` is that of the visibility grid, ``visibility.npz``, which has
-    the visibility of the problem.
+    ``seen`` (k, t) is in the order of the record, ``weights`` (t,) are those of the objective, and ``key`` is that of
+    the visibility grid, ``visibility.npz``.
     """
 
     key: str
     targets: Targets
     areas: tuple[Area, ...]
     seen: Boolean
-    problem: PlacementConstraints
+    weights: Float
 
 
 def save_site_file(
@@ -108,18 +108,5 @@ def load_site_file(path: str | os.PathLike[str]) -> SiteFile:
             arrays["targets"], arrays["weight"], arrays["central"].astype(bool), float(header["spacing_m"])
         )
         named = [(str(name), str(kind)) for name, kind in header["areas"]]
-        problem = PlacementConstraints(
-            weights=arrays["counted"],
-            prices=arrays["price"],
-            positions=arrays["position"],
-            xyz=arrays["xyz"],
-            labels=arrays["sensor"],
-            mandatory=arrays["mandatory"].astype(bool),
-            mandatory_names=np.array(header["groups"], dtype=np.str_),
-            forbidden=arrays["forbidden"].astype(bool),
-            count=header["count"],
-            budget=header["budget_usd"],
-            min_distance=float(header["min_distance_m"]),
-        )
         areas = tuple(Area(*one, row.astype(bool)) for one, row in zip(named, arrays["within"], strict=True))
-        return SiteFile(str(header["key"]), targets, areas, arrays["seen"].astype(bool), problem)
+        return SiteFile(str(header["key"]), targets, areas, arrays["seen"].astype(bool), arrays["counted"])

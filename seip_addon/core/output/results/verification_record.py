@@ -71,7 +71,7 @@ def pose_text(pose: InstalledSensor) -> str:
     ]
     at = f"{pose.id} is {math.hypot(*pose.shift_m):.2f} m from its planned position"
     where = f"{at}: {_listed(parts)}" if parts else at
-    known = f"each within {_within(max(pose.shift_half_width_m), 1000, 'mm')} with 95% confidence"
+    known = f"each within {max(1, math.ceil(1000 * max(pose.shift_half_width_m) - 1e-9)):,} mm with 95% confidence"
     lean_x, lean_y, turn = pose.rotation_deg
     lean, parts = math.hypot(lean_x, lean_y), []
     if abs(turn) >= _LEAST_ANGLE:
@@ -79,9 +79,9 @@ def pose_text(pose: InstalledSensor) -> str:
     if lean >= _LEAST_ANGLE:
         # A rotation vector (x, y) about horizontal axes moves the top of the sensor along (y, -x).
         parts.append(f"tilted {lean:.1f}° to the {direction((lean_y, -lean_x))}")
-    within = _within(max(pose.rotation_half_width_deg), 100, "hundredths of a degree", "one hundredth of a degree")
+    within = max(1, math.ceil(100 * max(pose.rotation_half_width_deg) - 1e-9)) / 100
     points = f"It is {_listed(parts)}" if parts else "It points as planned"
-    return f"{where}, {known}. {points}, within {within}."
+    return f"{where}, {known}. {points}, within {within:.2f}°."
 
 
 def gain_text(pose: InstalledSensor) -> str:
@@ -121,25 +121,13 @@ def vehicles(record: VerificationRecord) -> int:
     return sum(change.kind == "vehicle" for change in record.changes)
 
 
-def coverage_rows(steps: CoverageSteps) -> list[tuple[str, float, float | None]]:
-    """Return the causes by which coverage differs from the promise, with the coverage after each and its effect."""
-    shares = (steps.promised, steps.pose, steps.obstacles, steps.installed)
-    causes = ("as promised", "sensors where they are", "objects as they are", "gains as they are")
-    effects = (None, *(after - before for before, after in pairwise(shares)))
-    return list(zip(causes, shares, effects, strict=True))
-
-
-def signed_points(effect: float) -> str:
-    """Return a difference of coverage in percentage points, with its sign."""
-    number = round(100 * effect, 1)
-    return f"{'−' if number < 0 else '+' if number > 0 else ''}{abs(number):.1f}"
-
-
 def coverage_text(steps: CoverageSteps) -> str:
-    """Return promised and installed coverage, and what makes the difference."""
+    """Return promised and installed coverage, and what makes the difference, one effect after the other."""
     names = ("poses of the sensors", "changed objects", "gain")
-    effects = [effect for _, _, effect in coverage_rows(steps) if effect is not None]
-    parts = [f"{name} {signed_points(effect)}" for name, effect in zip(names, effects, strict=True)]
+    shares = pairwise((steps.promised, steps.pose, steps.obstacles, steps.installed))
+    effects = [round(100 * (after - before), 1) for before, after in shares]
+    signs = ["−" if effect < 0 else "+" if effect > 0 else "" for effect in effects]
+    parts = [f"{name} {sign}{abs(effect):.1f}" for name, sign, effect in zip(names, signs, effects, strict=True)]
     return (
         f"The installation sees {steps.installed:.1%} of the road; {steps.promised:.1%} were promised. "
         f"In percentage points: {', '.join(parts)}."
@@ -148,9 +136,3 @@ def coverage_text(steps: CoverageSteps) -> str:
 
 def _listed(parts: Sequence[str]) -> str:
     return " and ".join([", ".join(parts[:-1]), parts[-1]]) if len(parts) > 1 else parts[0]
-
-
-def _within(half: float, per_unit: float, unit: str, single: str = "") -> str:
-    """Return a half width in small units, rounded up."""
-    number = max(1, math.ceil(half * per_unit - 1e-9))
-    return single if number == 1 and single else f"{number:,} {unit}"

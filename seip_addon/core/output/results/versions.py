@@ -1,4 +1,7 @@
-"""Versions of the program and its libraries, which every record states."""
+"""Versions of the program and its libraries, which every record states.
+
+`tests/core/output/results/test_placement_record.py` shows their use.
+"""
 
 import importlib.util
 import platform
@@ -11,16 +14,7 @@ MANIFEST = Path(__file__).parents[4] / "blender_manifest.toml"
 
 
 def versions(**more: str) -> dict[str, str]:
-    """Return the versions of this program, of Python and of the libraries that results depend on, and ``more``.
-
-    Examples
-    --------
-    >>> stated = versions(blender="4.5.3")
-    >>> stated["python"] == platform.python_version(), stated["blender"]
-    (True, '4.5.3')
-    >>> {"seip", "numpy", "shapely"} <= stated.keys()
-    True
-    """
+    """Return the versions of this program, of Python and of the libraries that results depend on, and ``more``."""
     if MANIFEST.is_file():
         program = tomllib.loads(MANIFEST.read_text(encoding="utf-8"))["version"]
     else:  # installed by pip

@@ -12,25 +12,27 @@ import pytest
 import shapely
 
 from seip_addon.core.output.network.network_record import (
+    SCHEMA,
     NetworkRecord,
     NetworkSensor,
     NetworkSite,
     gain_text,
-    network_json,
     ranked_sites,
 )
 from seip_addon.core.output.network.write import make_network_report, write_network
 from seip_addon.core.output.report.blocks import Facts
+from seip_addon.core.storage.json_dataclass import from_json
 
 TYPES = ("os1_128", "vlp32c")
 NAMES = {"os1_128": "OS1-128", "vlp32c": "Product <VLP>"}
 PRICES = (18_000.0, 11_500.0)
+MIDDLE = (52.47, 13.44)
 CREATED = "2026-01-02T03:04:05+00:00"
 
 
-def make_site(number, draw, *, middle=(52.47, 13.44), spread=0.02, criterion="road", status="equipped", name=None):
+def make_site(number, draw, *, criterion="road", status="equipped", name=None):
     """Return a site of one to four sensors near a place."""
-    latitude, longitude = (np.array(middle) + draw.normal(scale=(spread, 1.6 * spread))).tolist()
+    latitude, longitude = (np.array(MIDDLE) + draw.normal(scale=(0.02, 0.032))).tolist()
     name = name or f"{draw.choice(['Mill', 'Harbour', 'Rope', 'Church'])} Lane / Street {number}"
     weight = float(draw.choice([1.0, 1.0, 2.0]))
     if status != "equipped":
@@ -49,17 +51,8 @@ def make_site(number, draw, *, middle=(52.47, 13.44), spread=0.02, criterion="ro
     coverage = float(1 - 0.55 ** len(types) * draw.uniform(0.6, 1.3))
     value = coverage if criterion == "road" else float(1.2 * coverage * len(types))
     figures = {"price_usd": price, "value": value, "bound": value * 1.01, "coverage": coverage}
-    return NetworkSite(
-        name,
-        f"sites/{number:03d}",
-        latitude,
-        longitude,
-        weight,
-        status,
-        "",
-        **figures,
-        sensors=sensors,
-    )
+    place = (name, f"sites/{number:03d}", latitude, longitude)
+    return NetworkSite(*place, weight, status, "", **figures, sensors=sensors)
 
 
 def make_network(count=25, *, criterion="road", statuses=("equipped",) * 5 + ("without sensor", "failed"), **changes):
@@ -92,15 +85,15 @@ def network_of(sites, *, criterion="road", **changes):
     )
 
 
-def make_streets(middle=(52.47, 13.44), reach=0.06):
+def make_streets(reach=0.06):
     """Return a grid of wavy streets of three ranks about a place."""
     along = np.linspace(-reach, reach, 200)
     streets = []
     for number in range(-30, 31):
         across = number * reach / 30 + 0.0006 * np.sin(90 * along + number)
         rank = 2 if number % 10 == 0 else int(number % 4 == 0)
-        streets.append((np.column_stack([along, across]) + middle, rank))
-        streets.append((np.column_stack([across, along]) + middle, rank))
+        streets.append((np.column_stack([along, across]) + MIDDLE, rank))
+        streets.append((np.column_stack([across, along]) + MIDDLE, rank))
     return streets
 
 
@@ -130,7 +123,8 @@ def test_the_record_survives_its_file_and_the_same_record_gives_the_same_bytes(t
     record = make_network(criterion=criterion)
     first, again = (write_network(tmp_path / name, record, make_streets()) for name in ("a", "b"))
     stored = json.loads((tmp_path / "a" / "network.json").read_text(encoding="utf-8"))
-    assert stored == json.loads(json.dumps(network_json(record)))
+    assert stored["schema"] == SCHEMA
+    assert from_json(NetworkRecord, stored) == record
     assert len(first) == 6
     for one, other in zip(first, again, strict=True):
         assert one.read_bytes() == other.read_bytes(), one.name
@@ -186,10 +180,10 @@ def test_sites_are_ranked_by_gain_per_dollar_with_their_weight():
     failed, bare = (make_site(4 + at, draw, status=status) for at, status in enumerate(("failed", "without sensor")))
     record = network_of((failed, free, bare, *twins))
     ranked = ranked_sites(record)
-    assert [one.site for one in ranked] == [twins[1], twins[0], twins[2], free, bare, failed]
+    assert [site for site, _ in ranked] == [twins[1], twins[0], twins[2], free, bare, failed]
     mean = (2.0 + bare.weight + 1.0 + 4.0 + 1.0) / 5
-    assert [one.gain for one in ranked[:3]] == pytest.approx([0.1 / mean, 0.025 / mean, 0.025 / mean])
-    assert [one.rank for one in ranked] == [1, 2, 3, None, None, None]
+    assert [gain for _, gain in ranked[:3]] == pytest.approx([0.1 / mean, 0.025 / mean, 0.025 / mean])
+    assert [gain for _, gain in ranked[3:]] == [None, None, None]
     assert gain_text(record, 0.0251) == "2.51 points"
     assert gain_text(replace(record, criterion="returns"), math.log(1.25)) == "25.0%"
 

@@ -1,13 +1,31 @@
-"""Colours of coverage, sensors and areas: no hue means two things, and one module states them all."""
+"""Colours: which stay apart for whom, the classes of targets, two placements compared, and texts that keep counts."""
 
 from itertools import combinations
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from seip_addon.core.output.pictures.palette import INK, PAPER, RETURNS_COLOURS, SEEN_COLOURS, rgb
-from seip_addon.core.output.pictures.plan_map import LAND, PAVEMENT, ROAD
+from seip_addon.core.output.pictures.palette import (
+    BOTH,
+    INK,
+    KEPT_ONLY,
+    NEITHER,
+    PAPER,
+    PRESENT_ONLY,
+    RETURNS_COLOURS,
+    SEEN_COLOURS,
+    colouring,
+    compare,
+    packed_counts,
+    rgb,
+    unpacked_counts,
+)
+from seip_addon.core.output.pictures.plan_view import LAND, PAVEMENT, ROAD
 
+SEEN_BY = np.array([0, 1, 2, 3, 7, 0])
+WEIGHT = np.array([1.0, 1.0, 2.0, 4.0, 2.0, 1.0])
 GROUNDS = (LAND, PAVEMENT, ROAD)
 XYZ = np.array(
     [(0.4124564, 0.3575761, 0.1804375), (0.2126729, 0.7151522, 0.0721750), (0.0193339, 0.1191920, 0.9503041)]
@@ -57,3 +75,28 @@ def test_classes_of_coverage_and_sensors_stay_apart_for_every_eye_and_in_grey_pr
     marks = (INK, PAPER)  # of sensors on plan and view: dark with a light border
     assert min(apart(mark, road, sight) for mark in marks[:1] for road in (*RETURNS_COLOURS, *GROUNDS)) > 25.0
     assert min(apart(mark, road, sight) for mark in marks[1:] for road in SEEN_COLOURS) > 20.0
+
+
+@pytest.mark.parametrize(
+    ("aspect", "words", "of"),
+    [
+        ("seen", ("not seen", "seen"), [0, 1, 1, 1, 1, 0]),
+        ("times", ("not seen", "seen by one sensor", "seen by two or more"), [0, 1, 2, 2, 2, 0]),
+        ("weights", ("weight 1", "weight 2", "weight 4"), [0, 0, 1, 2, 1, 0]),
+    ],
+)
+def test_each_aspect_has_its_classes(aspect, words, of):
+    found = colouring(aspect, SEEN_BY, WEIGHT)
+    assert (found.words, found.of.tolist()) == (words, of)
+    assert len(set(found.colours)) == len(words)
+    assert found.shares == pytest.approx(np.bincount(of) / len(of))
+
+
+@given(st.lists(st.tuples(st.integers(0, 3), st.integers(0, 3)), min_size=1, max_size=50))
+def test_shares_are_those_of_sets_of_targets(pairs):
+    kept, present = ({i for i, pair in enumerate(pairs) if pair[side]} for side in (0, 1))
+    packed = [packed_counts(np.array([pair[side] for pair in pairs], dtype=np.int64)) for side in (0, 1)]
+    shares = compare(*map(unpacked_counts, packed)).shares
+    for number, targets in ((BOTH, kept & present), (KEPT_ONLY, kept - present), (PRESENT_ONLY, present - kept)):
+        assert shares[number] == len(targets) / len(pairs)
+    assert shares[NEITHER] == (len(pairs) - len(kept | present)) / len(pairs)

@@ -1,9 +1,12 @@
 """Names of streets on a map that a user pans and zooms."""
 
 import math
+from itertools import combinations
 
 import numpy as np
 import pytest
+import shapely
+from shapely.affinity import rotate
 
 from seip_addon.core.geometry.map_view import MapView
 from seip_addon.core.output.pictures.street_labels import REPEATED, street_labels
@@ -33,21 +36,11 @@ def widths():
     return np.random.default_rng(6).uniform(40.0, 120.0, 30)
 
 
-def corners(label, width):
-    """Corners of a label's turned box, (4, 2)."""
-    turn = np.array([(math.cos(label.angle), math.sin(label.angle)), (-math.sin(label.angle), math.cos(label.angle))])
-    box = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]) * (width / 2, HEIGHT / 2)
-    return np.array(label.middle) + box @ turn
-
-
-def overlap(one, other):
-    """Return whether two turned boxes overlap: no side of either separates them."""
-    for box in (one, other):
-        for axis in np.diff(box[:3], axis=0):
-            a, b = one @ axis, other @ axis
-            if a.max() <= b.min() or b.max() <= a.min():
-                return False
-    return True
+def box_of(label, width):
+    """Return a label's turned box."""
+    x, y = label.middle
+    upright = shapely.box(x - width / 2, y - HEIGHT / 2, x + width / 2, y + HEIGHT / 2)
+    return rotate(upright, label.angle, origin=label.middle, use_radians=True)
 
 
 @pytest.mark.parametrize("scale", [0.3, 3.0])
@@ -57,14 +50,11 @@ def test_labels_are_in_the_frame_and_neither_overlap_nor_cover_dots(places, widt
     dots = np.column_stack((generator.uniform(0, 1000, 40), generator.uniform(0, 800, 40), np.full(40, 6.0)))
     labels = street_labels(places, widths, HEIGHT, view, dots)
     assert labels
-    numbers = [places.names.index(one.name) for one in labels]
-    boxes = [corners(one, widths[number]) for one, number in zip(labels, numbers, strict=True)]
-    assert np.all((np.array(boxes) >= 0) & (np.array(boxes) <= FRAME[2:]))
-    for number, (one, box) in enumerate(zip(labels, boxes, strict=True)):
-        for other, other_box in zip(labels[:number], boxes[:number], strict=True):
-            assert not overlap(box, other_box)
-            if one.name == other.name:
-                assert math.dist(one.middle, other.middle) >= REPEATED
-        for x, y, radius in dots.tolist():
-            square = np.array([(x, y)]) + np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]) * radius / 1.5
-            assert not overlap(box, square)
+    boxes = [box_of(one, widths[places.names.index(one.name)]) for one in labels]
+    assert all(shapely.box(*FRAME).covers(box) for box in boxes)
+    discs = shapely.buffer(shapely.points(dots[:, :2]), dots[:, 2] * 0.999)
+    for (one, box), (other, other_box) in combinations(zip(labels, boxes, strict=True), 2):
+        assert not box.intersects(other_box)
+        if one.name == other.name:
+            assert math.dist(one.middle, other.middle) >= REPEATED
+    assert not any(box.intersects(discs).any() for box in boxes)

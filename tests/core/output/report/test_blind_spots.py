@@ -1,9 +1,10 @@
-"""Blind spots, and what is seen of places: against counting by hand and a search that shares no code."""
+"""Blind spots, and what is seen of places: against counting by hand and scipy's labels."""
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.ndimage import label
 
 from seip_addon.core.output.report.blind_spots import blind_spots, seen_places, seen_streets
 from seip_addon.core.output.report.sections import after_failures
@@ -17,20 +18,12 @@ def targets_at(places, spacing=2.0, central=()) -> Targets:
     return Targets(xyz, np.where(inside, 2.0, 1.0), inside, spacing)
 
 
-def flooded(places) -> list[set]:
-    """Return the connected parts of whole places, found by walking from neighbour to neighbour."""
-    left, parts = set(places), []
-    while left:
-        waiting, part = [left.pop()], set()
-        while waiting:
-            x, y = waiting.pop()
-            part.add((x, y))
-            for near in ((x + 1, y), (x - 1, y), (x, y + 1), (x, y - 1)):
-                if near in left:
-                    left.remove(near)
-                    waiting.append(near)
-        parts.append(part)
-    return parts
+def connected(places) -> list[set]:
+    """Return the connected parts of whole places."""
+    grid = np.zeros((10, 10), dtype=bool)
+    grid[tuple(np.array(places, dtype=np.int64).reshape(-1, 2).T)] = True
+    parts, count = label(grid)
+    return [set(map(tuple, np.argwhere(parts == number).tolist())) for number in range(1, count + 1)]
 
 
 @given(st.sets(st.tuples(st.integers(0, 9), st.integers(0, 9)), min_size=1), st.data())
@@ -39,7 +32,7 @@ def test_parts_are_those_that_can_be_walked(places, data):
     seen = np.array([data.draw(st.booleans()) for _ in places])
     targets = targets_at(places)
     spots = blind_spots(targets, seen, ())
-    expected = flooded(place for place, one in zip(places, seen, strict=True) if not one)
+    expected = connected([place for place, one in zip(places, seen, strict=True) if not one])
     assert sorted(sorted(places[t] for t in spot.targets) for spot in spots) == sorted(map(sorted, expected))
     assert [spot.area for spot in spots] == sorted((4.0 * len(part) for part in expected), reverse=True)
     for spot in spots:
@@ -62,9 +55,8 @@ def test_places_are_counted_from_the_junction_and_not_from_the_middle_of_a_bound
 
 def test_places_have_the_shares_that_counting_gives():
     targets = targets_at([(x, 0) for x in range(8)])
-    seen_by = np.array([0, 1, 2, 3, 0, 0, 0, 1])
     lane, none = Area("Lane", "place", np.arange(8) < 4), Area("Nowhere", "place", np.zeros(8, dtype=bool))
-    (found,) = seen_places(targets, seen_by, (lane, none))
+    (found,) = seen_places(targets, np.array([0, 1, 2, 3, 0, 0, 0, 1]), (lane, none))
     assert (found.name, found.area, found.seen, found.seen_twice) == ("Lane", 16.0, 0.75, 0.5)
 
 

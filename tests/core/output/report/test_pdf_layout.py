@@ -15,7 +15,6 @@ from seip_addon.core.output.report.blocks import (
     Paragraph,
     Picture,
     Report,
-    Section,
     Table,
 )
 from seip_addon.core.output.report.pdf import BOTTOM, HEADING, as_pdf
@@ -70,14 +69,14 @@ def sections(seed):
                     )
                 )
             )
-        yield Section(f"Section {number}", tuple(blocks))
+        yield f"Section {number}", tuple(blocks)
 
 
 @pytest.mark.parametrize("seed", few(range(12), 4))
 def test_pages_are_more_than_half_full(seed):
     first = (Facts((("Where", TEXT),), large=True), Picture(png(600, 500), "View"), Paragraph(TEXT * (4 + 2 * seed)))
-    plan = Section("Plan", (Picture(png(600, 800), "Plan", tall=True),))
-    report = Report("Crossing", "Positions", "2026-01-02T03:04:05+00:00", first, (plan, *sections(seed)))
+    plan = {"Plan": (Picture(png(600, 800), "Plan", tall=True),)}
+    report = Report("Crossing", "Positions", "2026-01-02T03:04:05+00:00", first, plan | dict(sections(seed)))
     *pages, _ = lowest_marks(as_pdf(report))
     assert len(pages) > 4
     assert min(pages) > 0.5 * PAGE
@@ -89,13 +88,12 @@ def test_no_heading_ends_a_page(filled):
     rows = tuple((str(row), TEXT) for row in range(9))
     firsts = (Table(("Number", "Text"), rows), Facts(rows), Card("S1", (Facts(rows),)), Picture(png(600, 400), "View"))
     for first in firsts:
-        before = Section("Before", (Bullets(("Line",) * filled),))
         report = Report(
             "Crossing",
             "Positions",
             "2026-01-02T03:04:05+00:00",
             (Paragraph(TEXT),),
-            (before, Section("After", (first,))),
+            {"Before": (Bullets(("Line",) * filled),), "After": (first,)},
         )
         headings = 0
         for texts, images in pages_of(as_pdf(report)):

@@ -6,11 +6,11 @@ from html import unescape
 import pytest
 
 from seip_addon.core.base.errors import SeipError
-from seip_addon.core.output.report.blocks import Picture, Table
+from seip_addon.core.output.report.blocks import Picture, Table, as_html
 from seip_addon.core.output.report.evidence import load_evidence
-from seip_addon.core.output.report.html import as_html
 from seip_addon.core.output.report.pdf import as_pdf
 from seip_addon.core.output.report.sections import make_report
+from seip_addon.core.output.results.verification_record import coverage_text
 from tests.builders.report_folder import make_folder
 from tests.builders.verification_folder import make_verification
 
@@ -24,11 +24,11 @@ def folder(tmp_path):
 
 
 def section(folder):
-    return next((one for one in make_report(load_evidence(folder)).sections if one.title == TITLE), None)
+    return make_report(load_evidence(folder)).sections[TITLE]
 
 
 def of_kind(folder, kind):
-    return [block for block in section(folder).blocks if isinstance(block, kind)]
+    return [block for block in section(folder) if isinstance(block, kind)]
 
 
 def test_the_section_tells_poses_changes_coverage_and_gain(folder):
@@ -38,13 +38,8 @@ def test_the_section_tells_poses_changes_coverage_and_gain(folder):
     for one in record.sensors:
         assert f"{one.id} is 0.36 m from its planned position" in page
         assert f"{one.id} has a gain of 0.64" in page
-    steps, changes = of_kind(folder, Table)
-    assert steps.rows == (
-        ("As promised", "62.0%", ""),
-        ("Sensors where they are", "60.0%", "−2.0"),
-        ("Objects as they are", "60.5%", "+0.5"),
-        ("Gains as they are", "51.0%", "−9.5"),
-    )
+    assert coverage_text(record.coverage) in page
+    (changes,) = of_kind(folder, Table)
     assert [(row[0], row[1], row[3]) for row in changes.rows] == [
         ("Found 1: not in the plan", "3.0 × 1.5 × 4.0", "costs 1.2 points"),
         ("Kiosk <b>: no longer there", "4.0 × 4.0 × 3.0", "adds 0.4 points"),
@@ -56,13 +51,10 @@ def test_the_section_tells_poses_changes_coverage_and_gain(folder):
     assert "Kiosk <b>" not in as_html(make_report(load_evidence(folder)))
 
 
-def test_pictures_may_be_missing_but_not_damaged(folder):
+def test_the_picture_may_be_missing(folder):
     make_verification(folder)
     (folder / "verification" / "changes.png").unlink()
     assert len(of_kind(folder, Picture)) == 0
-    (folder / "verification" / "changes.png").write_bytes(b"none")
-    with pytest.raises(SeipError, match=r"changes\.png is damaged .* verify the installation again"):
-        load_evidence(folder)
 
 
 @pytest.mark.parametrize("changed", [{"id": "S99"}, {"local_m": [0.0, 0.0, 9.0]}])

