@@ -5,8 +5,6 @@ seip network sites.csv --budget 500_000 --scheduler tcp://HOST:8786 -o city/
 """
 
 import argparse
-import functools
-import json
 import math
 import os
 import shutil
@@ -16,8 +14,9 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from headless import runtime, survey
-from headless.network_run import PROBLEM, NetworkRequest, run_network
-from headless.network_tasks import FORMAT, MEMORY, survey_version
+from headless.network_run import extract_of, run_network
+from headless.network_site import PROBLEM
+from headless.network_workers import MEMORY, connected
 from headless.options import add_settings, new_parser, real_number, whole_number
 
 import numpy as np
@@ -30,21 +29,12 @@ from seip_addon.core.base.limits import LATITUDE, LONGITUDE, PRICE, SENSORS, SHA
 from seip_addon.core.base.progress import finish
 from seip_addon.core.choosing.placement.objective import Objective
 from seip_addon.core.output.network.write import write_network
-from seip_addon.core.programs.dask_client import connected
 from seip_addon.core.programs.sumo_programs import find_sumo
-from seip_addon.core.sensing.visibility.ray_casting import engine_name
 from seip_addon.core.site.installed_cost import DEFAULTS
 from seip_addon.core.storage.files import read_small
-from seip_addon.core.workflows.network_sites import (
-    APPROACHES,
-    NetworkPlace,
-    extract_places,
-    site_key,
-    site_source,
-    table_places,
-)
+from seip_addon.core.workflows.network_sites import APPROACHES, NetworkPlace, extract_places, table_places
+from seip_addon.core.workflows.network_survey import NetworkRequest
 from seip_addon.core.world.openstreetmap.crossings import RULES
-from seip_addon.core.world.openstreetmap.extract import Extract, read_extract
 from seip_addon.core.world.openstreetmap.site import is_extract
 from seip_addon.core.world.openstreetmap.streets import importance, is_street
 
@@ -75,10 +65,9 @@ def main(argv: list[str]) -> None:
         _check_sumo(places, options.output)
     number = options.workers or _usual_workers()
     _state_needs(options, len(places), number)
-    source = _Sources(request)
     try:
         with connected(options.scheduler, number) as client, runtime.progress_bar() as report:
-            record = finish(run_network(name, places, source, request, client, options.output), report)
+            record = finish(run_network(name, places, request, client, options.output), report)
         record = replace(record, created=datetime.now(UTC).date().isoformat())
         write_network(options.output, record, _streets(places))
     except KeyboardInterrupt as stop:
@@ -92,32 +81,6 @@ def main(argv: list[str]) -> None:
     runtime.print_line(f"{counted(sensors, 'sensor')} at {where}, ${record.price_usd:,.0f}")
     runtime.print_line(record.certificate)
     runtime.print_line(f"written to {options.output}/: report.html and report.pdf show the result")
-
-
-class _Sources:
-    """Files that sites are built from, with the extracts that were read last."""
-
-    def __init__(self, request: NetworkRequest) -> None:
-        settings, objective = request.settings, request.objective
-        self._approaches = request.approaches
-        own = [path.read_bytes().hex() for path in settings.catalogue]
-        record = settings.as_record()
-        del record["effort"]  # does not change a survey
-        self._settings = (
-            *(json.dumps(record, sort_keys=True), *own, engine_name(settings.engine), FORMAT, survey_version()),
-            *(repr(request.approaches), objective.criterion, repr(objective.shares), repr(objective.count)),
-        )
-
-    def __call__(self, place: NetworkPlace) -> tuple[str, bytes, str]:
-        """Return suffix and content of a site's source, and the site's key."""
-        extract = _extract(place.source) if is_extract(place.source) else None
-        suffix, content = site_source(place, self._approaches, extract)
-        return suffix, content, site_key(place, content, *self._settings)
-
-
-@functools.lru_cache(maxsize=2)
-def _extract(path: Path) -> Extract:
-    return finish(read_extract(path))
 
 
 def _places(options: argparse.Namespace) -> tuple[tuple[NetworkPlace, ...], str]:
@@ -136,7 +99,7 @@ def _streets(places: Sequence[NetworkPlace]) -> list[tuple[Float, int]]:
     """Return lines and importance of the streets of the sites' extracts, for the background of the map."""
     streets = []
     for path in dict.fromkeys(place.source for place in places if is_extract(place.source)):
-        extract = _extract(path)
+        extract = extract_of(path)
         for way in extract.ways.values():
             line = extract.line(way)
             if "highway" in way.tags and is_street(way.tags) and len(line) > 1:

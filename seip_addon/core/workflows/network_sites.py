@@ -159,8 +159,8 @@ def table_places(path: Path, approaches: float) -> tuple[NetworkPlace, ...]:
     return _numbered(places, approaches)
 
 
-def site_source(place: NetworkPlace, approaches: float, extract: Extract | None) -> tuple[str, bytes]:
-    """Return suffix and content of the file that a site is built from: its part of an extract, or the whole file.
+def site_source(place: NetworkPlace, approaches: float, extract: Extract | None) -> bytes:
+    """Return the content of the file that a site is built from: its part of an extract, or the whole file.
 
     Parameters
     ----------
@@ -169,8 +169,8 @@ def site_source(place: NetworkPlace, approaches: float, extract: Extract | None)
     """
     if extract is not None:
         reach = ExtractPlace(approaches=approaches).reach + STREET_REACH + 200.0  # as `site_of_extract` has it
-        return ".osm", extract_xml(cropped(extract, window(place.latitude, place.longitude, reach)))
-    return place.source.suffix, read_small(place.source, _MOST_BYTES, "divide it")
+        return extract_xml(cropped(extract, window(place.latitude, place.longitude, reach)))
+    return read_small(place.source, _MOST_BYTES, "divide it")
 
 
 def site_key(place: NetworkPlace, content: bytes, *settings: str) -> str:

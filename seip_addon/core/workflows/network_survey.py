@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Generator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -19,6 +19,27 @@ from ..choosing.placement.problem import Placement
 from .network_sites import NetworkPlace
 from .returns import survey_returns
 from .survey import Survey
+from .survey_settings import SurveySettings
+
+
+@dataclass(frozen=True)
+class NetworkRequest:
+    """Choices of a network besides its places.
+
+    Parameters
+    ----------
+    budget : float, dollars
+    tolerance : float
+        Gap at which the search ends, as a share of the value.
+    objective : Objective
+        Criterion and largest number of sensors at each site.
+    """
+
+    budget: float
+    tolerance: float
+    approaches: float
+    settings: SurveySettings
+    objective: Objective
 
 
 def site_problem(survey: Survey, objective: Objective, place: NetworkPlace) -> Generator[Progress, None, SiteProblem]:
