@@ -28,14 +28,16 @@ from headless.detection.matching import Rule
 from headless.detection.pillars import grid_over
 from headless.detection.rules import MAIN_RULE
 from headless.detection.settings import BOTTOM, TOP
+from headless.detection.shared_scans import load_frames, save_frames
 from headless.detection.traffic_ground import apart, moved_ground
 from headless.detection.training import make_deterministic
-from headless.detection_results import print_precision, remove_detections, save_charts, save_detections
+from headless.detection_results import STORED, print_precision, remove_detections, save_charts, save_detections
 from headless.options import real_number
 
 import bpy
 import numpy as np
 import shapely
+from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
 from seip_addon.core.base.arrays import Boolean, Float
@@ -59,6 +61,7 @@ from seip_addon.core.sensing.visibility.ray_casting import make_ray_caster
 from seip_addon.core.site.scene_geometry import SceneGeometry, joined
 from seip_addon.core.storage.files import digest, natural_order, save_json, whole_file
 from seip_addon.core.storage.json_dataclass import as_json
+from seip_addon.core.storage.source_digest import source_digest
 from seip_addon.scene.read import read_scene
 from seip_addon.scene.sensors import read_sensors
 
@@ -140,9 +143,7 @@ def detect_recording(options: argparse.Namespace, detector: Detector) -> None:
     for name, background in backgrounds:
         runtime.LOG.info(background.confidence(name))
     folder = options.output
-    remove_detections(folder)
-    for stale in (folder / "frames").glob("[0-9]*.png"):
-        stale.unlink()
+    remove_detections(folder, since=len(frames))
     with runtime.incomplete_if_interrupted(folder):
         results = runtime.finish_with_bar(_detected(options, frames, detector, area, labels, confidence))
     fullest = max(range(len(results)), key=lambda number: len(results[number].detected))
@@ -211,25 +212,39 @@ def _detected(
 ) -> Generator[Progress, None, list[FrameResult]]:
     """Detect in each frame, write detections and picture, and return the results.
 
-    Results have ground truth where the frames have labels.
+    Results have ground truth where the frames have labels. The result of a frame is stored last, under a digest of all
+    that it follows from, so that work that was stopped goes on.
     """
-    total = len(frames)
+    total, folder, ground = len(frames), options.output, frames.ground
     blocks = _BLOCKS if total >= _BLOCKS * _LEAST_PER_BLOCK else 1
     places = np.array([sensor.mounted.xyz for sensor in frames.sensors])
+    inputs = (source_digest("headless"), repr(confidence), area.site, places, frames.region.wkb)
+    common = digest(*inputs, ground.low, ground.step, ground.heights)
     results = []
     make_deterministic(os.cpu_count() or 1)
     for number in range(total):
         yield Progress(number, total, "detecting")
         frame = frames.frame(number, None if labels is None else labels[number])
-        found = _inside(detect(detector, area, frame), frames)
         run = f"part {number * blocks // total + 1}" if blocks > 1 else "recording"
+        key = digest(common, run, frame.time, *_arrays(frame), *_arrays(frame.labels))
+        stored = folder / STORED / f"{number:06d}-{key[:32]}.npz"
+        if stored.exists():
+            results += load_frames(stored)
+            continue
+        remove_detections(folder, number)
+        found = _inside(detect(detector, area, frame), frames)
         result = frame_result(frame, found, region=frames.region, sensors=places, run=run)
-        path = options.output / "frames" / f"{number:06d}.png"
-        _save_picture(path, frame, confidence.applied(result).detected, frames, area.site)
-        save_detections(options.output, number, found.boxes, result.detected.category.tolist(), found.score)
+        picture = folder / "frames" / f"{number:06d}.png"
+        _save_picture(picture, frame, confidence.applied(result).detected, frames, area.site)
+        save_detections(folder, number, found.boxes, result.detected.category.tolist(), found.score)
+        save_frames(stored, [result])
         results.append(result)
     yield Progress(total, total, "detecting")
     return results
+
+
+def _arrays(holder: object) -> list[NDArray[Any]]:
+    return [value for value in vars(holder).values() if isinstance(value, np.ndarray)]
 
 
 def area_of_recording(frames: RecordedFrames, detector: Detector, name: str) -> DetectionArea:

@@ -11,6 +11,7 @@ or as plain Python on the bpy module::
 
 import argparse
 import sys
+from contextlib import ExitStack
 from pathlib import Path
 
 if not __package__:  # run as a file by `blender -P`
@@ -27,6 +28,7 @@ from seip_addon.core.sensing.traffic.floating_car_data import listed
 from seip_addon.core.sensing.traffic.source import TrafficFiles, describe_categories, load_traffic
 from seip_addon.core.sensing.traffic.trajectories import Trajectories
 from seip_addon.core.site.scene_geometry import SceneGeometry
+from seip_addon.core.storage.files import locked
 from seip_addon.core.workflows.traffic_simulation import SimulationSettings
 from seip_addon.core.world.traffic_simulation.demand import Demand
 from seip_addon.scene.blend_file import check_name, save_blend
@@ -42,7 +44,10 @@ def main(argv: list[str]) -> None:
     options = _options(argv)
     if options.animate is not None:
         check_name(options.animate)
-    _make(options)
+    with ExitStack() as locks:
+        for path in filter(None, (options.output, options.animate)):
+            locks.enter_context(locked(path, folder=False))
+        _make(options)
 
 
 def _options(argv: list[str]) -> argparse.Namespace:

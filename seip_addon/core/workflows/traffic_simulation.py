@@ -16,7 +16,7 @@ from ..base.progress import Progress, within
 from ..base.settings import setting
 from ..sensing.traffic.trajectories import Trajectories
 from ..site.scene_geometry import SceneGeometry
-from ..storage.files import content_fault, locked_folder, parse_json, read_small, save_json, unfinished_name
+from ..storage.files import content_fault, locked, parse_json, read_small, save_json, unfinished_name
 from ..world.traffic_simulation.demand import Demand
 from ..world.traffic_simulation.simulation import Scenario, SignalPlan, SimulatedRun, simulate_run
 from .traffic_runs import runs_in
@@ -125,7 +125,7 @@ def simulate_runs(
     """
     if count < 1:
         raise SeipError(f"the number of runs must be 1 or more, not {count}")
-    with locked_folder(folder):
+    with locked(folder, folder=True):
         earlier = _earlier_runs(folder)
         runs: list[SimulatedRun] = []
         with TemporaryDirectory(prefix=unfinished_name(folder, "runs-").name, dir=folder) as temporary:
