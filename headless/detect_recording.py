@@ -6,8 +6,6 @@ seip detect sweeps/ --sensor os1_128 -o out/detected
 from __future__ import annotations
 
 import argparse
-import csv
-import io
 import math
 import os
 from collections.abc import Generator, Mapping, Sequence
@@ -59,6 +57,7 @@ from seip_addon.core.sensing.scans.scanner import ReflectiveSurface
 from seip_addon.core.sensing.scans.static_scene import static_scene
 from seip_addon.core.sensing.visibility.ray_casting import make_ray_caster
 from seip_addon.core.site.scene_geometry import SceneGeometry, joined
+from seip_addon.core.storage.csv_table import save_csv
 from seip_addon.core.storage.files import digest, natural_order, save_json, whole_file
 from seip_addon.core.storage.json_dataclass import as_json
 from seip_addon.core.storage.source_digest import source_digest
@@ -387,11 +386,8 @@ def _save_table(
 
     Latitude and longitude are columns only if the map has them.
     """
-    table = io.StringIO()
-    write = csv.writer(table, lineterminator="\n")
+    rows: list[list[object]] = []
     georeferenced = geometry is not None and geometry.geo_reference.mercator is not None
-    write.writerow((*_COLUMNS, "latitude", "longitude") if georeferenced else _COLUMNS)
-    count = 0
     for number, result in enumerate(results):
         found = result.detected
         kept = np.flatnonzero(found.score >= LEAST_CONFIDENCE)
@@ -403,16 +399,14 @@ def _save_table(
             sizes = [f"{value:.3f}" for value in (x, y, z, length, width, height)]
             place = [] if where is None else [f"{where[row, 1]:.7f}", f"{where[row, 0]:.7f}"]
             angle = f"{math.degrees(yaw):.1f}"
-            write.writerow(
+            rows.append(
                 [
                     *(number, f"{result.time:.3f}", found.category[one], f"{found.score[one]:.3f}", *sizes, angle),
                     *("yes" if beside[number][one] else "", *place),
                 ]
             )
-            count += 1
-    with whole_file(path) as temporary:
-        temporary.write_text(table.getvalue(), encoding="utf-8")
-    return count
+    save_csv(path, (*_COLUMNS, "latitude", "longitude") if georeferenced else _COLUMNS, rows)
+    return len(rows)
 
 
 def _listed(results: Sequence[FrameResult]) -> dict[str, float | int | None]:

@@ -32,8 +32,13 @@ from seip_addon.core.output.network.write import write_network
 from seip_addon.core.programs.sumo_programs import find_sumo
 from seip_addon.core.site.installed_cost import DEFAULTS
 from seip_addon.core.storage.files import read_small
-from seip_addon.core.workflows.network_sites import APPROACHES, NetworkPlace, extract_places, table_places
-from seip_addon.core.workflows.network_survey import NetworkRequest
+from seip_addon.core.workflows.network_sites import (
+    APPROACHES,
+    NetworkPlace,
+    NetworkRequest,
+    extract_places,
+    table_places,
+)
 from seip_addon.core.world.openstreetmap.crossings import RULES
 from seip_addon.core.world.openstreetmap.site import is_extract
 from seip_addon.core.world.openstreetmap.streets import importance, is_street

@@ -29,8 +29,7 @@ from seip_addon.core.sensing.visibility.ray_casting import engine_name
 from seip_addon.core.storage.files import digest, save_json, whole_file
 from seip_addon.core.storage.json_dataclass import as_json, from_json
 from seip_addon.core.storage.source_digest import source_digest
-from seip_addon.core.workflows.network_sites import NetworkPlace, site_key, site_source
-from seip_addon.core.workflows.network_survey import NetworkRequest
+from seip_addon.core.workflows.network_sites import NetworkPlace, NetworkRequest, site_key, site_source
 from seip_addon.core.world.openstreetmap.extract import Extract, read_extract
 from seip_addon.core.world.openstreetmap.site import is_extract
 

@@ -11,9 +11,11 @@ import subprocess
 from collections.abc import Generator, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from ..base.errors import SeipError
-from ..base.progress import Progress, in_thread
+from ..base.progress import Progress
+from .child_process import run_logged
 
 MISSING = (
     "SUMO is not installed, which lays out streets and simulates traffic: install Eclipse SUMO and put sumo and "
@@ -115,22 +117,12 @@ def run(programs: Sumo, program: Path, arguments: Sequence[object], what: str) -
     SeipError
         The program fails.
     """
-    environment = os.environ | ({} if programs.home is None else {"SUMO_HOME": str(programs.home)})
-
-    process = subprocess.Popen(  # noqa: S603  # SUMO's program, found by its name, and our arguments
-        [str(part) for part in (program, *arguments)],
-        env=environment,
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
-    try:
-        _, complaint = yield from in_thread(lambda _stop: process.communicate(), what)
-    finally:  # also if the generator is closed early
-        process.kill()
-        process.wait()
-    if process.returncode != 0:
+    environment = {} if programs.home is None else {"SUMO_HOME": str(programs.home)}
+    with TemporaryDirectory(prefix="seip-") as folder:
+        log, command = Path(folder) / "log", [str(part) for part in (program, *arguments)]
+        status = yield from run_logged(command, log, lambda _: Progress(0, 0, what), environment=environment)
+        complaint = log.read_text(encoding="utf-8", errors="replace")
+    if status != 0:
         raise SeipError(f"{program.name} failed: {_last_error(complaint)}; check the map, or simulate in SUMO itself")
 
 

@@ -21,6 +21,7 @@ from ..base.distinct_names import distinct_names
 from ..base.errors import SeipError
 from ..base.limits import LATITUDE, LONGITUDE, WEIGHT, Limits
 from ..base.progress import Progress
+from ..choosing.placement.objective import Objective
 from ..geometry.geo_reference import GeoReference
 from ..geometry.solids import from_faces
 from ..geometry.tangent_plane import plan_metres
@@ -31,6 +32,7 @@ from ..world.openstreetmap.extract import Extract, Tags, cropped, read_extract, 
 from ..world.openstreetmap.site import STREET_REACH, ExtractPlace
 from ..world.streetscape.model import SiteModel
 from ..world.streetscape.parts import Part
+from .survey_settings import SurveySettings
 
 XML_CONTROL = {number: None for number in range(32) if number not in (9, 10, 13)}
 """Control characters, which XML cannot hold."""
@@ -108,6 +110,26 @@ class NetworkPlace:
     weight: float
     source: Path
     neighbours: tuple[tuple[float, float], ...] = ()
+
+
+@dataclass(frozen=True)
+class NetworkRequest:
+    """Choices of a network besides its places.
+
+    Parameters
+    ----------
+    budget : float, dollars
+    tolerance : float
+        Gap at which the search ends, as a share of the value.
+    objective : Objective
+        Criterion and largest number of sensors at each site.
+    """
+
+    budget: float
+    tolerance: float
+    approaches: float
+    settings: SurveySettings
+    objective: Objective
 
 
 def extract_places(
