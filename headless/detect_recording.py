@@ -9,7 +9,6 @@ import argparse
 import math
 import os
 from collections.abc import Generator, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -61,6 +60,7 @@ from seip_addon.core.storage.csv_table import save_csv
 from seip_addon.core.storage.files import digest, natural_order, save_json, whole_file
 from seip_addon.core.storage.json_dataclass import as_json
 from seip_addon.core.storage.source_digest import source_digest
+from seip_addon.core.workflows.verifying import of_recorded
 from seip_addon.scene.read import read_scene
 from seip_addon.scene.sensors import read_sensors
 
@@ -80,15 +80,6 @@ _COLUMNS = (
     *("frame", "time_s", "category", "confidence"),
     *("x_m", "y_m", "z_m", "length_m", "width_m", "height_m", "yaw_deg", "apart"),
 )
-
-
-@dataclass(frozen=True, eq=False)
-class _Sensors:
-    """Models and poses of a recording's sensors, and the scene that they are from, if any."""
-
-    models: Mapping[str, LidarModel]
-    poses: Mapping[str, Float]
-    geometry: SceneGeometry | None
 
 
 def add_recording_options(parser: argparse.ArgumentParser) -> None:
@@ -123,20 +114,20 @@ def is_recording(source: Path | None) -> bool:
 def detect_recording(options: argparse.Namespace, detector: Detector) -> None:
     """Detect road users in every frame of a recording, and write detections, pictures and figures."""
     runtime.check_folder(options.output)
-    sensors, recording = _opened(options)
+    recording, models, poses, geometry = _opened(options)
     labels = _labels(options.labels, len(paired(recording)))
     confidence = Confidence.of_detector(options.detector, detector)
     frames = runtime.finish_with_bar(
         prepare_frames(
             recording,
-            sensors.models,
-            sensors.poses,
+            models,
+            poses,
             radius=options.radius,
-            scene=None if sensors.geometry is None else _scene(sensors.geometry),
+            scene=None if geometry is None else _scene(geometry),
         )
     )
     _require_vehicle(labels, frames.region, options.labels)
-    site = recording.name if sensors.geometry is None else sensors.geometry.name
+    site = recording.name if geometry is None else geometry.name
     area = area_of_recording(frames, detector, site)
     backgrounds = [(sensor.mounted.label, sensor.background) for sensor in frames.sensors]
     for name, background in backgrounds:
@@ -148,15 +139,15 @@ def detect_recording(options: argparse.Namespace, detector: Detector) -> None:
     fullest = max(range(len(results)), key=lambda number: len(results[number].detected))
     scan = frames.frame(fullest)
     doubts = [sentence for name, background in backgrounds for sentence in background.warnings(name)]
-    doubts += suitability_warnings(detector, [one.key for one in sensors.models.values()], site)
+    doubts += suitability_warnings(detector, [one.key for one in models.values()], site)
     if any(sensor.intensity_scale is None for sensor in frames.sensors):
         doubts.append(
             "the recording has no intensities: all points get the same one, and fewer road users may be found"
         )
     runtime.warn(doubts)
     confident = [confidence.applied(one) for one in results]
-    beside = _apart(confident, sensors.geometry)
-    listed = _save_table(folder / "detections.csv", confident, beside, sensors.geometry)
+    beside = _apart(confident, geometry)
+    listed = _save_table(folder / "detections.csv", confident, beside, geometry)
     outcome = _evaluated(results, fullest, scan) if labels is not None else None
     record: dict[str, Any] = {
         "schema": RECORDING_SCHEMA,
@@ -196,7 +187,7 @@ def detect_recording(options: argparse.Namespace, detector: Detector) -> None:
         f"{listed:,} road users with a confidence of {LEAST_CONFIDENCE:g} or more in {len(frames):,} frames"
     )
     if record["apart"]:
-        ground = "off the scene's road" if sensors.geometry else "standing where no vehicle was seen to move"
+        ground = "off the scene's road" if geometry else "standing where no vehicle was seen to move"
         runtime.print_line(f"{record['apart']:,} of them are vehicles {ground}, often false: column apart")
     runtime.print_line(f"written to {folder}/: detections.csv, frames/, kitti/, openpcdet/")
 
@@ -259,8 +250,10 @@ def _inside(found: Detections, frames: RecordedFrames) -> Detections:
     return Detections(found.boxes[inside], found.score[inside], found.category[inside])
 
 
-def _opened(options: argparse.Namespace) -> tuple[_Sensors, Recording]:
-    """Open the recording with the models and poses of its sensors."""
+def _opened(
+    options: argparse.Namespace,
+) -> tuple[Recording, dict[str, LidarModel], dict[str, Float], SceneGeometry | None]:
+    """Open the recording; return it with the models and poses of its sensors, and their scene, if any."""
     catalogue = load_catalogue(options.catalogue)
     if options.site is not None:
         if options.sensor or options.poses:
@@ -271,16 +264,9 @@ def _opened(options: argparse.Namespace) -> tuple[_Sensors, Recording]:
         if not placed:
             raise SeipError(f"{options.site} has no sensors: give a placed scene, or --sensor and --poses")
         recording = open_recording(options.scene, min(one.model.rotation_rate for one in placed.values()))
-        if len(recording.sensors) == len(placed) == 1:
-            placed = {recording.sensors[0].name: next(iter(placed.values()))}
-        unknown = [record.name for record in recording.sensors if record.name not in placed]
-        if unknown:
-            raise SeipError(
-                f"{options.site} has the sensors {', '.join(placed)}, but the recording has {', '.join(unknown)}: "
-                "name the folders of sweeps after the sensors"
-            )
-        poses = {name: _pose(one.xyz, one.orientation) for name, one in placed.items()}
-        return _Sensors({name: one.model for name, one in placed.items()}, poses, geometry), recording
+        own = of_recorded(recording, placed, str(options.site))
+        poses = {name: _pose(one.xyz, one.orientation) for name, one in own.items()}
+        return recording, {name: one.model for name, one in own.items()}, poses, geometry
     if not options.sensor:
         raise SeipError("name the sensor that made the recording, as --sensor os1_128, or the scene with --site")
     named = dict(_split(text) for text in options.sensor)
@@ -290,18 +276,8 @@ def _opened(options: argparse.Namespace) -> tuple[_Sensors, Recording]:
         if record.name not in named and "" not in named:
             raise SeipError(f"--sensor names no model for {record.name}: add {record.name}=KEY")
     found = {record.name: models[named[record.name if record.name in named else ""]] for record in recording.sensors}
-    return _Sensors(found, {} if options.poses is None else _poses(options.poses, list(found)), None), recording
-
-
-def _poses(path: Path, names: Sequence[str]) -> dict[str, Float]:
-    """Read the poses of named sensors; the pose of one sensor may have any name."""
-    poses = read_poses(path)
-    if len(poses) == len(names) == 1:
-        return {names[0]: next(iter(poses.values()))}
-    missing = [name for name in names if name not in poses]
-    if missing:
-        raise SeipError(f"{path} has no pose of {', '.join(missing)}: it has those of {', '.join(poses)}")
-    return poses
+    known = {} if options.poses is None else of_recorded(recording, read_poses(options.poses), str(options.poses))
+    return recording, found, known, None
 
 
 def _scene(geometry: SceneGeometry) -> RecordedScene:
