@@ -99,15 +99,13 @@ def check_folder(folder: Path) -> tuple[Path, ...]:
     SeipError
         The folder cannot be created or written.
     """
-    made: tuple[Path, ...] = ()
-    try:
+    with _writing(folder):
         made = _make_folder(folder)
-        with tempfile.TemporaryFile(dir=folder):
-            pass
-    except OSError as error:
-        remove_empty(made)
-        reason = error.strerror or str(error)
-        raise SeipError(f"cannot write to {folder}: {reason}; choose a folder that you may write to") from error
+        try:
+            tempfile.TemporaryFile(dir=folder).close()
+        except OSError:
+            remove_empty(made)
+            raise
     return made
 
 
@@ -320,4 +318,4 @@ def _writing(path: Path) -> Iterator[None]:
     except OSError as error:
         reason = error.strerror or str(error)
         cure = "make room there" if error.errno in _SPACE_ERRORS else "choose a folder that you may write to"
-        raise SeipError(f"cannot write {path}: {reason}; {cure}") from error
+        raise SeipError(f"cannot write to {path}: {reason}; {cure}") from error
