@@ -5,8 +5,6 @@ seip network sites.csv --budget 500_000 --scheduler tcp://HOST:8786 -o city/
 """
 
 import argparse
-import math
-import os
 import shutil
 from collections.abc import Sequence
 from dataclasses import replace
@@ -16,14 +14,14 @@ from pathlib import Path
 from headless import runtime, survey
 from headless.network_run import extract_of, run_network
 from headless.network_site import PROBLEM
-from headless.network_workers import MEMORY, connected
+from headless.network_workers import connected, usual_workers
 from headless.options import add_settings, new_parser, real_number, whole_number
 
 import numpy as np
 import shapely
 
 from seip_addon.core.base.arrays import Float
-from seip_addon.core.base.counts import counted
+from seip_addon.core.base.counts import counted, duration_text
 from seip_addon.core.base.errors import SeipError
 from seip_addon.core.base.limits import LATITUDE, LONGITUDE, PRICE, SENSORS, SHARE, SITE_RADIUS, Limits
 from seip_addon.core.base.progress import finish
@@ -68,7 +66,7 @@ def main(argv: list[str]) -> None:
     )
     if options.scheduler is None:
         _check_sumo(places, options.output)
-    number = options.workers or _usual_workers()
+    number = options.workers or usual_workers()
     _state_needs(options, len(places), number)
     try:
         with connected(options.scheduler, number) as client, runtime.progress_bar() as report:
@@ -133,20 +131,6 @@ def _check_sumo(places: Sequence[NetworkPlace], folder: Path) -> None:
         find_sumo()
 
 
-def _memory() -> float:
-    """Return the memory of this machine, bytes; infinite where it is unknown."""
-    try:
-        return float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
-    except (AttributeError, ValueError, OSError):  # not on Windows
-        return math.inf
-
-
-def _usual_workers() -> int:
-    """Return the number of workers for which this machine has cores and memory."""
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    return max(1, math.floor(min(cores, _memory() / MEMORY)))
-
-
 def _state_needs(options: argparse.Namespace, sites: int, number: int) -> None:
     """State what a run needs at most; refuse one for which the disk has no room."""
     disk = sites * DISK_PER_SITE / 1000.0
@@ -154,14 +138,12 @@ def _state_needs(options: argparse.Namespace, sites: int, number: int) -> None:
     if free < disk:
         raise SeipError(f"{options.output} needs about {disk:.1f} GB, and its disk has {free:.1f} GB: free some space")
     seconds, memory = sites * SECONDS_PER_SITE / number, number * MEMORY_PER_WORKER
-    needs = f"about {_duration(seconds)} on {counted(number, 'worker')}, {memory:g} GiB of memory"
+    needs = f"about {duration_text(seconds)} on {counted(number, 'worker')}, {memory:g} GiB of memory"
     if options.scheduler is not None:
-        needs = f"about {_duration(sites * SECONDS_PER_SITE)} of one worker, {MEMORY_PER_WORKER:g} GiB for each worker"
+        needs = (
+            f"about {duration_text(sites * SECONDS_PER_SITE)} of one worker, {MEMORY_PER_WORKER:g} GiB for each worker"
+        )
     runtime.LOG.info(f"{counted(sites, 'site')}: {needs} and {disk:.2g} GB on the disk if none is finished")
-
-
-def _duration(seconds: float) -> str:
-    return f"{seconds / 3600.0:.1f} h" if seconds > 3600.0 else f"{math.ceil(seconds / 60.0)} min"
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-import importlib
+import importlib.util
 import logging
 import sys
 from collections.abc import Callable, Iterator, Sequence
@@ -29,6 +29,24 @@ Client = Any
 """`distributed.Client`, which has no types."""
 
 
+def check_dask() -> None:
+    """Raise SeipError if Dask is not installed."""
+    if importlib.util.find_spec("distributed") is None:
+        raise SeipError(
+            "a scheduler needs Dask, which is not installed; install the extra 'cluster' in the project's folder: "
+            "pip install '.[cluster]'"
+        )
+
+
+def usual_workers() -> int:
+    """Return the number of workers for which this machine, or the container, has cores and memory."""
+    check_dask()
+    from dask.system import CPU_COUNT  # noqa: PLC0415 - an extra
+    from distributed.system import MEMORY_LIMIT  # noqa: PLC0415 - as above
+
+    return max(1, min(CPU_COUNT, MEMORY_LIMIT // MEMORY))
+
+
 @contextmanager
 def connected(address: str | None, workers: int = 1) -> Iterator[Client]:
     """Yield a client of a Dask scheduler, and close it at the end.
@@ -46,14 +64,10 @@ def connected(address: str | None, workers: int = 1) -> Iterator[Client]:
     SeipError
         Dask is not installed, or the scheduler does not answer or has no workers.
     """
-    try:
-        import dask  # noqa: PLC0415 - an extra that need not be installed
-        from distributed import Client, LocalCluster  # noqa: PLC0415 - as above
-    except ImportError as error:
-        raise SeipError(
-            "a scheduler needs Dask, which is not installed; install the extra 'cluster' in the project's folder: "
-            "pip install '.[cluster]'"
-        ) from error
+    check_dask()
+    import dask  # noqa: PLC0415 - an extra that need not be installed
+    from distributed import Client, LocalCluster  # noqa: PLC0415 - as above
+
     if address is None:
         # Processes that are killed leave their temporary files: those of the workers lie in a folder of this one.
         with (
