@@ -137,12 +137,10 @@ def _state_needs(options: argparse.Namespace, sites: int, number: int) -> None:
     free = shutil.disk_usage(options.output).free / 1e9
     if free < disk:
         raise SeipError(f"{options.output} needs about {disk:.1f} GB, and its disk has {free:.1f} GB: free some space")
-    seconds, memory = sites * SECONDS_PER_SITE / number, number * MEMORY_PER_WORKER
-    needs = f"about {duration_text(seconds)} on {counted(number, 'worker')}, {memory:g} GiB of memory"
+    seconds, memory = sites * SECONDS_PER_SITE, number * MEMORY_PER_WORKER
+    needs = f"about {duration_text(seconds / number)} on {counted(number, 'worker')}, {memory:g} GiB of memory"
     if options.scheduler is not None:
-        needs = (
-            f"about {duration_text(sites * SECONDS_PER_SITE)} of one worker, {MEMORY_PER_WORKER:g} GiB for each worker"
-        )
+        needs = f"about {duration_text(seconds)} of one worker, {MEMORY_PER_WORKER:g} GiB for each worker"
     runtime.LOG.info(f"{counted(sites, 'site')}: {needs} and {disk:.2g} GB on the disk if none is finished")
 
 
