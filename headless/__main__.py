@@ -5,6 +5,7 @@ In a checkout ``python -m headless`` is the same command.
 
 import runpy
 import sys
+from collections.abc import Mapping
 
 from headless.process_end import end_on_signals
 
@@ -26,7 +27,7 @@ def main() -> None:
     end_on_signals()
     request = sys.argv[1] if len(sys.argv) > 1 else "--help"
     if request in {"-h", "--help"}:
-        sys.stdout.write(_usage())
+        sys.stdout.write(f"{usage('seip COMMAND', 'Choose and evaluate roadside LiDAR sensors.', VERBS)}\n")
         return
     if request not in VERBS:
         sys.exit(f"error: there is no command {request!r}: seip --help lists the commands")
@@ -34,13 +35,11 @@ def main() -> None:
     runpy.run_module(f"headless.{request.replace('-', '_')}", run_name="__main__", alter_sys=True)
 
 
-def _usage() -> str:
-    width = max(map(len, VERBS))
-    verbs = "\n".join(f"  {verb:{width}}  {what}" for verb, what in VERBS.items())
-    return (
-        "usage: seip COMMAND [options]    (seip COMMAND --help lists them)\n\n"
-        f"Choose and evaluate roadside LiDAR sensors.\n\n{verbs}\n"
-    )
+def usage(command: str, about: str, names: Mapping[str, str]) -> str:
+    """Return the help of a command whose first argument is one of several names."""
+    width = max(map(len, names))
+    lines = "\n".join(f"  {name:{width}}  {what}" for name, what in names.items())
+    return f"usage: {command} [options]    ({command} --help lists them)\n\n{about}\n\n{lines}"
 
 
 if __name__ == "__main__":

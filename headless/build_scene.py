@@ -24,6 +24,7 @@ from seip_addon.core.base.errors import SeipError
 from seip_addon.core.base.progress import finish
 from seip_addon.core.programs.sumo_programs import NETWORK_SUFFIX
 from seip_addon.core.site.sources import source_lines
+from seip_addon.core.storage.files import locked
 from seip_addon.core.workflows.site_building import SiteRequest, build_site, save_map
 from seip_addon.core.world.openstreetmap.map_links import parsed_position
 from seip_addon.core.world.openstreetmap.overpass import OVERPASS, OverpassServer, user_cache
@@ -35,7 +36,8 @@ def main(argv: list[str]) -> None:
     """Read the source, model the site and save it."""
     request = _parser().parse_args(argv)
     check_name(request.output)
-    _build(request)
+    with locked(request.output, folder=False):
+        _build(request)
 
 
 def _build(request: argparse.Namespace) -> None:

@@ -28,7 +28,7 @@ from headless.detection_results import (
     save_charts,
     save_detections,
 )
-from headless.options import add_settings, add_weather, new_parser, read_settings, real_number
+from headless.options import add_settings, add_weather, new_parser, read_settings, real_number, refuse_idle
 from headless.scanned_scene import read_scanned_scene
 
 import bpy
@@ -51,10 +51,14 @@ _OF_RECORDINGS = ("sensor", "poses", "site", "labels", "radius")
 
 def main(argv: list[str]) -> None:
     """Scan the runs, detect, and write figures, charts and detections to a folder."""
-    options = _options(argv)
+    parser = _parser()
+    options = parser.parse_args(argv)
+    recorded = is_recording(options.scene)
+    idle, use = (_OF_SCENES, "scene with traffic") if recorded else (_OF_RECORDINGS, "recording")
+    refuse_idle(parser, options, idle, f"a {use}")
     check_device(options.device)
     detector = Detector.load(options.detector, options.device)
-    if is_recording(options.scene):
+    if recorded:
         detect_recording(options, detector)
         return
     if not options.traffic:
@@ -102,18 +106,6 @@ def main(argv: list[str]) -> None:
         save_json(options.output / "detection.json", record)
     print_precision(outcome)
     runtime.print_line(f"written to {options.output}/")
-
-
-def _options(argv: list[str]) -> argparse.Namespace:
-    """Parse the arguments, and refuse options that do nothing for a recording, or for a scene."""
-    parser = _parser()
-    options = parser.parse_args(argv)
-    recording = is_recording(options.scene)
-    idle = _OF_SCENES if recording else _OF_RECORDINGS
-    given = [f"--{name.replace('_', '-')}" for name in idle if getattr(options, name) != parser.get_default(name)]
-    if given:
-        raise SeipError(f"{given[0]} is for a {'scene with traffic' if recording else 'recording'}: leave it out")
-    return options
 
 
 def _parser() -> argparse.ArgumentParser:

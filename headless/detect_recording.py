@@ -6,12 +6,9 @@ seip detect sweeps/ --sensor os1_128 -o out/detected
 from __future__ import annotations
 
 import argparse
-import csv
-import io
 import math
 import os
 from collections.abc import Generator, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -28,14 +25,16 @@ from headless.detection.matching import Rule
 from headless.detection.pillars import grid_over
 from headless.detection.rules import MAIN_RULE
 from headless.detection.settings import BOTTOM, TOP
+from headless.detection.shared_scans import load_frames, save_frames
 from headless.detection.traffic_ground import apart, moved_ground
 from headless.detection.training import make_deterministic
-from headless.detection_results import print_precision, remove_detections, save_charts, save_detections
+from headless.detection_results import STORED, print_precision, remove_detections, save_charts, save_detections
 from headless.options import real_number
 
 import bpy
 import numpy as np
 import shapely
+from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
 from seip_addon.core.base.arrays import Boolean, Float
@@ -57,8 +56,11 @@ from seip_addon.core.sensing.scans.scanner import ReflectiveSurface
 from seip_addon.core.sensing.scans.static_scene import static_scene
 from seip_addon.core.sensing.visibility.ray_casting import make_ray_caster
 from seip_addon.core.site.scene_geometry import SceneGeometry, joined
+from seip_addon.core.storage.csv_table import save_csv
 from seip_addon.core.storage.files import digest, natural_order, save_json, whole_file
 from seip_addon.core.storage.json_dataclass import as_json
+from seip_addon.core.storage.source_digest import source_digest
+from seip_addon.core.workflows.verifying import of_recorded
 from seip_addon.scene.read import read_scene
 from seip_addon.scene.sensors import read_sensors
 
@@ -78,15 +80,6 @@ _COLUMNS = (
     *("frame", "time_s", "category", "confidence"),
     *("x_m", "y_m", "z_m", "length_m", "width_m", "height_m", "yaw_deg", "apart"),
 )
-
-
-@dataclass(frozen=True, eq=False)
-class _Sensors:
-    """Models and poses of a recording's sensors, and the scene that they are from, if any."""
-
-    models: Mapping[str, LidarModel]
-    poses: Mapping[str, Float]
-    geometry: SceneGeometry | None
 
 
 def add_recording_options(parser: argparse.ArgumentParser) -> None:
@@ -121,42 +114,40 @@ def is_recording(source: Path | None) -> bool:
 def detect_recording(options: argparse.Namespace, detector: Detector) -> None:
     """Detect road users in every frame of a recording, and write detections, pictures and figures."""
     runtime.check_folder(options.output)
-    sensors, recording = _opened(options)
+    recording, models, poses, geometry = _opened(options)
     labels = _labels(options.labels, len(paired(recording)))
     confidence = Confidence.of_detector(options.detector, detector)
     frames = runtime.finish_with_bar(
         prepare_frames(
             recording,
-            sensors.models,
-            sensors.poses,
+            models,
+            poses,
             radius=options.radius,
-            scene=None if sensors.geometry is None else _scene(sensors.geometry),
+            scene=None if geometry is None else _scene(geometry),
         )
     )
     _require_vehicle(labels, frames.region, options.labels)
-    site = recording.name if sensors.geometry is None else sensors.geometry.name
+    site = recording.name if geometry is None else geometry.name
     area = area_of_recording(frames, detector, site)
     backgrounds = [(sensor.mounted.label, sensor.background) for sensor in frames.sensors]
     for name, background in backgrounds:
         runtime.LOG.info(background.confidence(name))
     folder = options.output
-    remove_detections(folder)
-    for stale in (folder / "frames").glob("[0-9]*.png"):
-        stale.unlink()
+    remove_detections(folder, since=len(frames))
     with runtime.incomplete_if_interrupted(folder):
         results = runtime.finish_with_bar(_detected(options, frames, detector, area, labels, confidence))
     fullest = max(range(len(results)), key=lambda number: len(results[number].detected))
     scan = frames.frame(fullest)
     doubts = [sentence for name, background in backgrounds for sentence in background.warnings(name)]
-    doubts += suitability_warnings(detector, [one.key for one in sensors.models.values()], site)
+    doubts += suitability_warnings(detector, [one.key for one in models.values()], site)
     if any(sensor.intensity_scale is None for sensor in frames.sensors):
         doubts.append(
             "the recording has no intensities: all points get the same one, and fewer road users may be found"
         )
     runtime.warn(doubts)
     confident = [confidence.applied(one) for one in results]
-    beside = _apart(confident, sensors.geometry)
-    listed = _save_table(folder / "detections.csv", confident, beside, sensors.geometry)
+    beside = _apart(confident, geometry)
+    listed = _save_table(folder / "detections.csv", confident, beside, geometry)
     outcome = _evaluated(results, fullest, scan) if labels is not None else None
     record: dict[str, Any] = {
         "schema": RECORDING_SCHEMA,
@@ -196,7 +187,7 @@ def detect_recording(options: argparse.Namespace, detector: Detector) -> None:
         f"{listed:,} road users with a confidence of {LEAST_CONFIDENCE:g} or more in {len(frames):,} frames"
     )
     if record["apart"]:
-        ground = "off the scene's road" if sensors.geometry else "standing where no vehicle was seen to move"
+        ground = "off the scene's road" if geometry else "standing where no vehicle was seen to move"
         runtime.print_line(f"{record['apart']:,} of them are vehicles {ground}, often false: column apart")
     runtime.print_line(f"written to {folder}/: detections.csv, frames/, kitti/, openpcdet/")
 
@@ -211,25 +202,39 @@ def _detected(
 ) -> Generator[Progress, None, list[FrameResult]]:
     """Detect in each frame, write detections and picture, and return the results.
 
-    Results have ground truth where the frames have labels.
+    Results have ground truth where the frames have labels. The result of a frame is stored last, under a digest of all
+    that it follows from, so that work that was stopped goes on.
     """
-    total = len(frames)
+    total, folder, ground = len(frames), options.output, frames.ground
     blocks = _BLOCKS if total >= _BLOCKS * _LEAST_PER_BLOCK else 1
     places = np.array([sensor.mounted.xyz for sensor in frames.sensors])
+    inputs = (source_digest("headless"), repr(confidence), area.site, places, frames.region.wkb)
+    common = digest(*inputs, ground.low, ground.step, ground.heights)
     results = []
     make_deterministic(os.cpu_count() or 1)
     for number in range(total):
         yield Progress(number, total, "detecting")
         frame = frames.frame(number, None if labels is None else labels[number])
-        found = _inside(detect(detector, area, frame), frames)
         run = f"part {number * blocks // total + 1}" if blocks > 1 else "recording"
+        key = digest(common, run, frame.time, *_arrays(frame), *_arrays(frame.labels))
+        stored = folder / STORED / f"{number:06d}-{key[:32]}.npz"
+        if stored.exists():
+            results += load_frames(stored)
+            continue
+        remove_detections(folder, number)
+        found = _inside(detect(detector, area, frame), frames)
         result = frame_result(frame, found, region=frames.region, sensors=places, run=run)
-        path = options.output / "frames" / f"{number:06d}.png"
-        _save_picture(path, frame, confidence.applied(result).detected, frames, area.site)
-        save_detections(options.output, number, found.boxes, result.detected.category.tolist(), found.score)
+        picture = folder / "frames" / f"{number:06d}.png"
+        _save_picture(picture, frame, confidence.applied(result).detected, frames, area.site)
+        save_detections(folder, number, found.boxes, result.detected.category.tolist(), found.score)
+        save_frames(stored, [result])
         results.append(result)
     yield Progress(total, total, "detecting")
     return results
+
+
+def _arrays(holder: object) -> list[NDArray[Any]]:
+    return [value for value in vars(holder).values() if isinstance(value, np.ndarray)]
 
 
 def area_of_recording(frames: RecordedFrames, detector: Detector, name: str) -> DetectionArea:
@@ -245,8 +250,10 @@ def _inside(found: Detections, frames: RecordedFrames) -> Detections:
     return Detections(found.boxes[inside], found.score[inside], found.category[inside])
 
 
-def _opened(options: argparse.Namespace) -> tuple[_Sensors, Recording]:
-    """Open the recording with the models and poses of its sensors."""
+def _opened(
+    options: argparse.Namespace,
+) -> tuple[Recording, dict[str, LidarModel], dict[str, Float], SceneGeometry | None]:
+    """Open the recording; return it with the models and poses of its sensors, and their scene, if any."""
     catalogue = load_catalogue(options.catalogue)
     if options.site is not None:
         if options.sensor or options.poses:
@@ -257,16 +264,9 @@ def _opened(options: argparse.Namespace) -> tuple[_Sensors, Recording]:
         if not placed:
             raise SeipError(f"{options.site} has no sensors: give a placed scene, or --sensor and --poses")
         recording = open_recording(options.scene, min(one.model.rotation_rate for one in placed.values()))
-        if len(recording.sensors) == len(placed) == 1:
-            placed = {recording.sensors[0].name: next(iter(placed.values()))}
-        unknown = [record.name for record in recording.sensors if record.name not in placed]
-        if unknown:
-            raise SeipError(
-                f"{options.site} has the sensors {', '.join(placed)}, but the recording has {', '.join(unknown)}: "
-                "name the folders of sweeps after the sensors"
-            )
-        poses = {name: _pose(one.xyz, one.orientation) for name, one in placed.items()}
-        return _Sensors({name: one.model for name, one in placed.items()}, poses, geometry), recording
+        own = of_recorded(recording, placed, str(options.site))
+        poses = {name: _pose(one.xyz, one.orientation) for name, one in own.items()}
+        return recording, {name: one.model for name, one in own.items()}, poses, geometry
     if not options.sensor:
         raise SeipError("name the sensor that made the recording, as --sensor os1_128, or the scene with --site")
     named = dict(_split(text) for text in options.sensor)
@@ -276,18 +276,8 @@ def _opened(options: argparse.Namespace) -> tuple[_Sensors, Recording]:
         if record.name not in named and "" not in named:
             raise SeipError(f"--sensor names no model for {record.name}: add {record.name}=KEY")
     found = {record.name: models[named[record.name if record.name in named else ""]] for record in recording.sensors}
-    return _Sensors(found, {} if options.poses is None else _poses(options.poses, list(found)), None), recording
-
-
-def _poses(path: Path, names: Sequence[str]) -> dict[str, Float]:
-    """Read the poses of named sensors; the pose of one sensor may have any name."""
-    poses = read_poses(path)
-    if len(poses) == len(names) == 1:
-        return {names[0]: next(iter(poses.values()))}
-    missing = [name for name in names if name not in poses]
-    if missing:
-        raise SeipError(f"{path} has no pose of {', '.join(missing)}: it has those of {', '.join(poses)}")
-    return poses
+    known = {} if options.poses is None else of_recorded(recording, read_poses(options.poses), str(options.poses))
+    return recording, found, known, None
 
 
 def _scene(geometry: SceneGeometry) -> RecordedScene:
@@ -372,11 +362,8 @@ def _save_table(
 
     Latitude and longitude are columns only if the map has them.
     """
-    table = io.StringIO()
-    write = csv.writer(table, lineterminator="\n")
+    rows: list[list[object]] = []
     georeferenced = geometry is not None and geometry.geo_reference.mercator is not None
-    write.writerow((*_COLUMNS, "latitude", "longitude") if georeferenced else _COLUMNS)
-    count = 0
     for number, result in enumerate(results):
         found = result.detected
         kept = np.flatnonzero(found.score >= LEAST_CONFIDENCE)
@@ -388,16 +375,14 @@ def _save_table(
             sizes = [f"{value:.3f}" for value in (x, y, z, length, width, height)]
             place = [] if where is None else [f"{where[row, 1]:.7f}", f"{where[row, 0]:.7f}"]
             angle = f"{math.degrees(yaw):.1f}"
-            write.writerow(
+            rows.append(
                 [
                     *(number, f"{result.time:.3f}", found.category[one], f"{found.score[one]:.3f}", *sizes, angle),
                     *("yes" if beside[number][one] else "", *place),
                 ]
             )
-            count += 1
-    with whole_file(path) as temporary:
-        temporary.write_text(table.getvalue(), encoding="utf-8")
-    return count
+    save_csv(path, (*_COLUMNS, "latitude", "longitude") if georeferenced else _COLUMNS, rows)
+    return len(rows)
 
 
 def _listed(results: Sequence[FrameResult]) -> dict[str, float | int | None]:

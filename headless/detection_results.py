@@ -27,6 +27,8 @@ from seip_addon.core.output.results.detection_record import FORMATS
 from seip_addon.core.sensing.scans.sensor import MountedSensor
 from seip_addon.core.storage.files import whole_file
 
+STORED = "stored"
+"""Folder of the results of frames of a recording, from which a run that was stopped goes on."""
 PLAN_COLUMNS = [0, 1, 3, 4, 6]
 
 
@@ -120,11 +122,12 @@ def read_detections(path: Path) -> Detections:
     return Detections(boxes, np.array(scores), np.array([category[name] for name in names], dtype=np.int64))
 
 
-def remove_detections(folder: Path) -> None:
-    """Remove the detections of an earlier run, which may have had more frames."""
-    for form in FORMATS:
-        for stale in (folder / form).glob("*.txt"):
-            stale.unlink()
+def remove_detections(folder: Path, number: int | None = None, *, since: int = 0) -> None:
+    """Remove the files of frames that an earlier run has written: of one frame, or of all from a number on."""
+    for form in (*FORMATS, "frames", STORED):
+        for stale in (folder / form).glob("[0-9]*.*" if number is None else f"{number:06d}*"):
+            if stale.name[:6].isdecimal() and int(stale.name[:6]) >= since:
+                stale.unlink()
 
 
 def print_precision(outcome: DetectorEvaluation) -> None:

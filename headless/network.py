@@ -5,10 +5,6 @@ seip network sites.csv --budget 500_000 --scheduler tcp://HOST:8786 -o city/
 """
 
 import argparse
-import functools
-import json
-import math
-import os
 import shutil
 from collections.abc import Sequence
 from dataclasses import replace
@@ -16,35 +12,32 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from headless import runtime, survey
-from headless.network_run import PROBLEM, NetworkRequest, run_network
-from headless.network_tasks import FORMAT, MEMORY, survey_version
+from headless.network_run import extract_of, run_network
+from headless.network_site import PROBLEM
+from headless.network_workers import connected, usual_workers
 from headless.options import add_settings, new_parser, real_number, whole_number
 
 import numpy as np
 import shapely
 
 from seip_addon.core.base.arrays import Float
-from seip_addon.core.base.counts import counted
+from seip_addon.core.base.counts import counted, duration_text
 from seip_addon.core.base.errors import SeipError
 from seip_addon.core.base.limits import LATITUDE, LONGITUDE, PRICE, SENSORS, SHARE, SITE_RADIUS, Limits
 from seip_addon.core.base.progress import finish
 from seip_addon.core.choosing.placement.objective import Objective
 from seip_addon.core.output.network.write import write_network
-from seip_addon.core.programs.dask_client import connected
 from seip_addon.core.programs.sumo_programs import find_sumo
-from seip_addon.core.sensing.visibility.ray_casting import engine_name
 from seip_addon.core.site.installed_cost import DEFAULTS
 from seip_addon.core.storage.files import read_small
 from seip_addon.core.workflows.network_sites import (
     APPROACHES,
     NetworkPlace,
+    NetworkRequest,
     extract_places,
-    site_key,
-    site_source,
     table_places,
 )
 from seip_addon.core.world.openstreetmap.crossings import RULES
-from seip_addon.core.world.openstreetmap.extract import Extract, read_extract
 from seip_addon.core.world.openstreetmap.site import is_extract
 from seip_addon.core.world.openstreetmap.streets import importance, is_street
 
@@ -73,12 +66,11 @@ def main(argv: list[str]) -> None:
     )
     if options.scheduler is None:
         _check_sumo(places, options.output)
-    number = options.workers or _usual_workers()
+    number = options.workers or usual_workers()
     _state_needs(options, len(places), number)
-    source = _Sources(request)
     try:
         with connected(options.scheduler, number) as client, runtime.progress_bar() as report:
-            record = finish(run_network(name, places, source, request, client, options.output), report)
+            record = finish(run_network(name, places, request, client, options.output), report)
         record = replace(record, created=datetime.now(UTC).date().isoformat())
         write_network(options.output, record, _streets(places))
     except KeyboardInterrupt as stop:
@@ -92,32 +84,6 @@ def main(argv: list[str]) -> None:
     runtime.print_line(f"{counted(sensors, 'sensor')} at {where}, ${record.price_usd:,.0f}")
     runtime.print_line(record.certificate)
     runtime.print_line(f"written to {options.output}/: report.html and report.pdf show the result")
-
-
-class _Sources:
-    """Files that sites are built from, with the extracts that were read last."""
-
-    def __init__(self, request: NetworkRequest) -> None:
-        settings, objective = request.settings, request.objective
-        self._approaches = request.approaches
-        own = [path.read_bytes().hex() for path in settings.catalogue]
-        record = settings.as_record()
-        del record["effort"]  # does not change a survey
-        self._settings = (
-            *(json.dumps(record, sort_keys=True), *own, engine_name(settings.engine), FORMAT, survey_version()),
-            *(repr(request.approaches), objective.criterion, repr(objective.shares), repr(objective.count)),
-        )
-
-    def __call__(self, place: NetworkPlace) -> tuple[str, bytes, str]:
-        """Return suffix and content of a site's source, and the site's key."""
-        extract = _extract(place.source) if is_extract(place.source) else None
-        suffix, content = site_source(place, self._approaches, extract)
-        return suffix, content, site_key(place, content, *self._settings)
-
-
-@functools.lru_cache(maxsize=2)
-def _extract(path: Path) -> Extract:
-    return finish(read_extract(path))
 
 
 def _places(options: argparse.Namespace) -> tuple[tuple[NetworkPlace, ...], str]:
@@ -136,7 +102,7 @@ def _streets(places: Sequence[NetworkPlace]) -> list[tuple[Float, int]]:
     """Return lines and importance of the streets of the sites' extracts, for the background of the map."""
     streets = []
     for path in dict.fromkeys(place.source for place in places if is_extract(place.source)):
-        extract = _extract(path)
+        extract = extract_of(path)
         for way in extract.ways.values():
             line = extract.line(way)
             if "highway" in way.tags and is_street(way.tags) and len(line) > 1:
@@ -165,35 +131,17 @@ def _check_sumo(places: Sequence[NetworkPlace], folder: Path) -> None:
         find_sumo()
 
 
-def _memory() -> float:
-    """Return the memory of this machine, bytes; infinite where it is unknown."""
-    try:
-        return float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
-    except (AttributeError, ValueError, OSError):  # not on Windows
-        return math.inf
-
-
-def _usual_workers() -> int:
-    """Return the number of workers for which this machine has cores and memory."""
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    return max(1, math.floor(min(cores, _memory() / MEMORY)))
-
-
 def _state_needs(options: argparse.Namespace, sites: int, number: int) -> None:
     """State what a run needs at most; refuse one for which the disk has no room."""
     disk = sites * DISK_PER_SITE / 1000.0
     free = shutil.disk_usage(options.output).free / 1e9
     if free < disk:
         raise SeipError(f"{options.output} needs about {disk:.1f} GB, and its disk has {free:.1f} GB: free some space")
-    seconds, memory = sites * SECONDS_PER_SITE / number, number * MEMORY_PER_WORKER
-    needs = f"about {_duration(seconds)} on {counted(number, 'worker')}, {memory:g} GiB of memory"
+    seconds, memory = sites * SECONDS_PER_SITE, number * MEMORY_PER_WORKER
+    needs = f"about {duration_text(seconds / number)} on {counted(number, 'worker')}, {memory:g} GiB of memory"
     if options.scheduler is not None:
-        needs = f"about {_duration(sites * SECONDS_PER_SITE)} of one worker, {MEMORY_PER_WORKER:g} GiB for each worker"
+        needs = f"about {duration_text(seconds)} of one worker, {MEMORY_PER_WORKER:g} GiB for each worker"
     runtime.LOG.info(f"{counted(sites, 'site')}: {needs} and {disk:.2g} GB on the disk if none is finished")
-
-
-def _duration(seconds: float) -> str:
-    return f"{seconds / 3600.0:.1f} h" if seconds > 3600.0 else f"{math.ceil(seconds / 60.0)} min"
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -180,6 +180,13 @@ def add_weather(group: argparse._ActionsContainer) -> None:
     )
 
 
+def refuse_idle(parser: argparse.ArgumentParser, options: argparse.Namespace, idle: Sequence[str], use: str) -> None:
+    """Raise SeipError if an option was given that does nothing here; ``use`` says what it is for."""
+    given = [name for name in idle if getattr(options, name) != parser.get_default(name)]
+    if given:
+        raise SeipError(f"--{given[0].replace('_', '-')} is for {use}: leave it out")
+
+
 def read_settings(kind: type[Options], options: argparse.Namespace, **values: Any) -> Options:  # noqa: ANN401 -- of fields of any type
     """Return the settings that options name; ``values`` are of fields that have no option of their own."""
     for name, (about, _) in settings_of(kind).items():

@@ -28,7 +28,7 @@ from headless.system_libraries import complaint, missing_libraries
 from seip_addon.core.base.acceptance import Acceptance
 from seip_addon.core.base.errors import SeipError
 from seip_addon.core.base.progress import Progress, finish, progress_line, reporter
-from seip_addon.core.storage.files import locked_folder
+from seip_addon.core.storage.files import locked
 from seip_addon.scene.interrupts import SIGNALS, held_signals
 
 try:
@@ -59,7 +59,7 @@ EXIT_STOPPED = 130  # what a shell reports of a command that was stopped by Ctrl
 SECONDS_BETWEEN_LINES = float(os.environ.get("SEIP_SECONDS_BETWEEN_LINES", "10"))  # of progress, in a log
 SECONDS_BETWEEN_BARS = 0.1  # of progress, in a terminal
 LOG = logging.getLogger("headless")  # progress and warnings of commands and modules; results go through `print_line`
-_FOLDERS = ExitStack()  # locks of the folders of results
+_LOCKS = ExitStack()  # of the folders of results
 _LOCKED: set[Path] = set()  # these folders
 
 
@@ -107,10 +107,9 @@ def check_folder(folder: Path) -> None:
     SeipError
         It cannot, or another run does.
     """
-    place = folder.resolve()
-    if place not in _LOCKED:
-        _FOLDERS.enter_context(locked_folder(folder))
-        _LOCKED.add(place)
+    if folder.resolve() not in _LOCKED:
+        _LOCKS.enter_context(locked(folder, folder=True))
+        _LOCKED.add(folder.resolve())
 
 
 @contextmanager
@@ -180,7 +179,8 @@ def _run(main: Callable[[list[str]], None]) -> NoReturn:
         try:
             main(refuse_pipes(arguments()))
         finally:
-            _leave_folders()
+            _LOCKS.close()
+            _LOCKED.clear()
     except KeyboardInterrupt as interrupt:
         _end(EXIT_STOPPED, str(interrupt) or "stopped, no result written")
     except Exception as error:
@@ -203,12 +203,6 @@ def refuse_pipes(words: list[str]) -> list[str]:
             if not (stat.S_ISREG(kind) or stat.S_ISDIR(kind)) and path != Path(os.devnull):
                 raise SeipError(f"{path} is neither a file nor a folder: write what it holds to a file, and name that")
     return words
-
-
-def _leave_folders() -> None:
-    """Unlock the folders of results, and remove those that were made in vain."""
-    _FOLDERS.close()
-    _LOCKED.clear()
 
 
 def finish_with_bar(steps: Generator[Progress, None, Result]) -> Result:

@@ -14,6 +14,7 @@ if not __package__:  # run as a file by `blender -P`
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from headless import runtime
+from headless.__main__ import usage
 
 from seip_addon.core.base.errors import SeipError
 
@@ -34,21 +35,12 @@ STUDIES = {
 def main(argv: list[str]) -> None:
     """Run the study that the first argument names, with the arguments after it."""
     if not argv or argv[0] in {"-h", "--help"}:
-        runtime.print_line(_usage())
+        runtime.print_line(usage("seip study NAME", "Run a study of the program's methods.", STUDIES))
         return
     name = argv[0]
     if name not in STUDIES:
         raise SeipError(f"there is no study {name!r}: seip study --help lists the studies")
     importlib.import_module(f"headless.studies.{name.replace('-', '_')}.command").main(argv[1:])
-
-
-def _usage() -> str:
-    width = max(map(len, STUDIES))
-    studies = "\n".join(f"  {name:{width}}  {what}" for name, what in STUDIES.items())
-    return (
-        "usage: seip study NAME [options]    (seip study NAME --help lists them)\n\n"
-        f"Run a study of the program's methods.\n\n{studies}"
-    )
 
 
 if __name__ == "__main__":

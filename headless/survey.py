@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import logging
 import time
 from collections.abc import Callable, Generator
 from dataclasses import dataclass, field
@@ -38,8 +37,6 @@ from seip_addon.scene.read import read_scene
 from seip_addon.scene.result_folder import write_result_folder
 
 Result = TypeVar("Result")
-
-LOG = logging.getLogger(__name__)
 
 
 @dataclass
@@ -136,14 +133,14 @@ def survey(
     watch = Stopwatch()
     reading = watch.time("read the scene", lambda: read_scene(bpy.context.scene))
     layout = watch.time("lay out the site", lambda: lay_out(reading.geometry, settings, reading.warnings))
-    LOG.info(_describe_site(layout.site))
+    runtime.LOG.info(_describe_site(layout.site))
     runtime.warn(layout.warnings)
     check(layout)
     file = options.output / "visibility.npz"
     if objective is not None:
         early = watch.run("early answer", early_answer(layout, objective, file))
         if early.best:
-            LOG.info("early answer from a few poses: %s", early.best)
+            runtime.LOG.info("early answer from a few poses: %s", early.best)
     surveyed = watch.run("visibility", see(layout, file))
     return surveyed, watch
 

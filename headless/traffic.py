@@ -11,22 +11,23 @@ or as plain Python on the bpy module::
 
 import argparse
 import sys
+from contextlib import ExitStack
 from pathlib import Path
 
 if not __package__:  # run as a file by `blender -P`
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from headless import runtime
-from headless.options import add_settings, new_parser, read_settings
+from headless.options import add_settings, new_parser, read_settings, refuse_idle
 
 import bpy
 
 from seip_addon.core.base.counts import counted
-from seip_addon.core.base.errors import SeipError
 from seip_addon.core.sensing.traffic.floating_car_data import listed
 from seip_addon.core.sensing.traffic.source import TrafficFiles, describe_categories, load_traffic
 from seip_addon.core.sensing.traffic.trajectories import Trajectories
 from seip_addon.core.site.scene_geometry import SceneGeometry
+from seip_addon.core.storage.files import locked
 from seip_addon.core.workflows.traffic_simulation import SimulationSettings
 from seip_addon.core.world.traffic_simulation.demand import Demand
 from seip_addon.scene.blend_file import check_name, save_blend
@@ -39,21 +40,16 @@ _SIMULATING = ("flow", "pedestrians", "seed", "warm_up")
 
 def main(argv: list[str]) -> None:
     """Read or simulate traffic, fit it to the road and write it."""
-    options = _options(argv)
-    if options.animate is not None:
-        check_name(options.animate)
-    _make(options)
-
-
-def _options(argv: list[str]) -> argparse.Namespace:
-    """Parse the arguments, and refuse options that do nothing for the chosen source."""
     parser = _parser()
     options = parser.parse_args(argv)
-    idle = _SIMULATING if options.fcd is not None else _READING
-    given = [f"--{name.replace('_', '-')}" for name in idle if getattr(options, name) != parser.get_default(name)]
-    if given:
-        raise SeipError(f"{given[0]} is for {'--simulate' if options.fcd is not None else '--fcd'}: leave it out")
-    return options
+    simulated = options.fcd is None
+    refuse_idle(parser, options, _READING if simulated else _SIMULATING, "--fcd" if simulated else "--simulate")
+    if options.animate is not None:
+        check_name(options.animate)
+    with ExitStack() as locks:
+        for path in filter(None, (options.output, options.animate)):
+            locks.enter_context(locked(path, folder=False))
+        _make(options)
 
 
 def _make(options: argparse.Namespace) -> None:

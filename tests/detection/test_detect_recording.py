@@ -142,6 +142,31 @@ def test_the_table_has_geographic_coordinates_if_the_map_names_its_projection(tm
     assert (float(row["longitude"]), float(row["latitude"])) == pytest.approx((longitude, latitude), abs=1e-7)
 
 
+def test_a_run_that_was_stopped_goes_on_and_gives_the_same_bytes(folder, results, tmp_path, monkeypatch):
+    output, calls = tmp_path / "out", []
+
+    def stopped(*inputs):
+        calls.append(inputs)
+        if len(calls) == 3:
+            raise KeyboardInterrupt
+        return found(*inputs)
+
+    def content(where):
+        files = [path for path in where.rglob("*") if path.is_file() and path.name != "detection.json"]
+        return {path.relative_to(where): path.read_bytes() for path in files}
+
+    found = detect_recording.detect
+    monkeypatch.setattr(detect_recording, "detect", stopped)
+    with pytest.raises(KeyboardInterrupt):
+        detect.main(arguments(folder, output, "--labels", str(folder / "labels")))
+    detect.main(arguments(folder, output, "--labels", str(folder / "labels")))
+    assert len(calls) == 3 + SWEEPS - 2
+    assert content(output) == content(results)
+    detect.main(arguments(folder, output))  # without labels other results
+    assert len(calls) == 3 + SWEEPS - 2 + SWEEPS
+    assert len(list((output / "stored").iterdir())) == SWEEPS
+
+
 def test_the_cars_are_found_where_they_are(results):
     with (results / "detections.csv").open(encoding="utf-8", newline="") as file:
         rows = [(int(row["frame"]), float(row["x_m"]), float(row["y_m"])) for row in csv.DictReader(file)]

@@ -1,6 +1,7 @@
 """Workers of a network: one that is killed, and a scheduler that stops, in processes of their own."""
 
 import json
+import os
 import signal
 import subprocess
 import sys
@@ -10,10 +11,9 @@ import pytest
 
 pytest.importorskip("distributed", reason="Dask is not installed: make environment")
 
-from headless.network_tasks import run_jobs
+from headless.network_workers import connected, run_jobs
 
 from seip_addon.core.base.errors import SeipError
-from seip_addon.core.programs.dask_client import connected
 
 pytestmark = pytest.mark.slow
 
@@ -57,17 +57,17 @@ def crew_of(address):
 def test_jobs_of_a_killed_worker_are_done_by_another(cluster):
     address, _, crew = cluster
     with crew_of(address) as there:
-        results = run_jobs(there, time.sleep, [lambda: 0.5] * 12)
+        results = run_jobs(there, time.sleep, [(0.5,)] * 12)
         done = [next(results)[0] for _ in range(2)]
         crew[0].send_signal(signal.SIGKILL)
-        done += [number for number, _ in results]
+        done += [number for number, _, reason in results if not reason]
     assert sorted(done) == list(range(12))
 
 
 def test_a_scheduler_that_stops_is_one_sentence(cluster, caplog, capfd):
     address, scheduler, _ = cluster
     with crew_of(address) as there:
-        results = run_jobs(there, time.sleep, [lambda: 1.0] * 30)
+        results = run_jobs(there, time.sleep, [(1.0,)] * 30)
         next(results)
         scheduler.send_signal(signal.SIGKILL)
         time.sleep(3.0)  # Dask tries to connect again meanwhile
@@ -75,3 +75,12 @@ def test_a_scheduler_that_stops_is_one_sentence(cluster, caplog, capfd):
             list(results)
     assert not [record for record in caplog.records if record.name == "distributed.client"]
     assert "Traceback" not in capfd.readouterr().err
+
+
+def test_a_job_that_ends_its_workers_is_a_failure_and_others_go_on():
+    with connected(None, 1) as there:
+        ended, whole = (
+            next(run_jobs(there, function, [(number,)])) for number, function in ((1, os._exit), (0, time.sleep))
+        )
+    assert ended == (0, None, "several workers ended in the midst of it, as when memory runs out: shorten --approaches")
+    assert whole == (0, None, "")

@@ -9,6 +9,8 @@ pytest.importorskip("bpy")
 
 from headless import runtime
 
+from seip_addon.core.storage.files import locked
+
 NONE = "missing.blend"
 COMMANDS = {
     "place": (),
@@ -19,7 +21,7 @@ COMMANDS = {
 
 def fails(monkeypatch, command, *arguments) -> str:
     """Run a command as from a shell, and return its exit status as text; it must be one of a failure."""
-    command, *study = command.split()
+    command, *study = command.replace("-", "_").split()
     monkeypatch.setattr(sys, "argv", [f"{command}.py", *study, *map(str, arguments)])
     monkeypatch.setattr(runtime.signal, "signal", lambda *_: None)  # those of the tests stay
     monkeypatch.delitem(sys.modules, f"headless.{command}", raising=False)  # other tests may have imported it
@@ -33,6 +35,22 @@ def test_a_missing_scene_leaves_no_folder(command, tmp_path, monkeypatch, capsys
     monkeypatch.chdir(tmp_path)
     assert fails(monkeypatch, command, NONE, "-o", "a/b", *COMMANDS[command]) == "1"
     assert NONE in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ("build-scene", "map.xodr", "-o", "a.blend"),
+        ("traffic", NONE, "--simulate", "map.xodr", "-o", "a.blend"),
+        ("traffic", NONE, "--simulate", "map.xodr", "-o", "a.npz", "--animate", "a.blend"),
+    ],
+)
+def test_a_file_that_another_command_writes_is_refused(command, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    with locked(tmp_path / "a.blend", folder=False):
+        assert fails(monkeypatch, *command) == "1"
+    assert "another run is writing to a.blend" in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == []
 
 

@@ -180,8 +180,7 @@ def test_what_is_imported_is_pinned():
     }
     everywhere = ours | {"seip_addon", "headless"} | set(sys.stdlib_module_names) | BLENDERS_OWN
     by_file = {
-        "dask_client.py": {"dask", "distributed"},
-        "network_tasks.py": {"distributed"},
+        "network_workers.py": {"dask", "distributed"},
         "lock_wheels.py": {"packaging"},
         "extract.py": {"osmium"},
     }

@@ -13,7 +13,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 OF_A_CHECKOUT = {"build_extension", "lock_wheels", "set_up"}
-OF_OTHER_COMMANDS = {"finalists", "network_site"}
+OF_OTHER_COMMANDS = {"finalists"}
 """Modules that a command starts in processes of their own."""
 
 

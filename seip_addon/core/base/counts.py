@@ -30,6 +30,14 @@ def typed_number(text: str) -> float:
     return float(text)
 
 
+def is_number(text: str) -> bool:
+    """Return whether a text is a finite number."""
+    try:
+        return math.isfinite(typed_number(text))
+    except ValueError:
+        return False
+
+
 def duration_text(seconds: float) -> str:
     """Return a duration as text, rounded as people state it: ``45 s``, ``3 min``, ``1.5 h``."""
     if seconds < 100:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.arrays import Float
+from ..base.counts import is_number
 
 _SEMI_MAJOR_AXIS, _FLATTENING = 6_378_137.0, 1 / 298.257223563  # of WGS 84; GRS 80 differs by 0.1 mm
 _THIRD_FLATTENING = _FLATTENING / (2 - _FLATTENING)
@@ -202,7 +203,7 @@ def projection(geo_reference: str | None) -> TransverseMercator | None:
     values = _parameters(text)
     kind = values.get("proj", "")
     datum = values.get("datum", values.get("ellps", "WGS84")).upper()
-    shifted = any(float(part or 0) for part in values.get("towgs84", "").split(",") if _is_number(part))
+    shifted = any(float(part or 0) for part in values.get("towgs84", "").split(",") if is_number(part))
     if datum not in _WORLD_DATUMS or shifted or values.get("units", "m") != "m":
         return None
     if kind == "utm" and values.get("zone", "").isdigit():
@@ -211,7 +212,7 @@ def projection(geo_reference: str | None) -> TransverseMercator | None:
         return None
     defaults = {"lat_0": "0", "lon_0": "0", "k": values.get("k_0", "1"), "x_0": "0", "y_0": "0"}
     given = [values.get(name, default) for name, default in defaults.items()]
-    if not all(map(_is_number, given)):
+    if not all(map(is_number, given)):
         return None
     latitude, longitude, scale, easting, northing = map(float, given)
     return TransverseMercator(math.radians(latitude), math.radians(longitude), scale, easting, northing)
@@ -232,10 +233,3 @@ def _epsg(zone: str) -> int:
 def _parameters(text: str) -> dict[str, str]:
     pairs = (word[1:].partition("=") for word in text.split() if word.startswith("+"))
     return {name: value for name, _, value in pairs}
-
-
-def _is_number(text: str) -> bool:
-    try:
-        return math.isfinite(float(text))
-    except ValueError:
-        return False

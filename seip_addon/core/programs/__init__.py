@@ -1,1 +1,1 @@
-"""Other programs and clusters that the core starts: SUMO, child processes, Dask."""
+"""Other programs that the core starts: SUMO, child processes."""

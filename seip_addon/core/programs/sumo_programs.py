@@ -13,7 +13,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..base.errors import SeipError
-from ..base.progress import Progress, in_thread
+from ..base.progress import Progress
+from .child_process import run_logged
 
 MISSING = (
     "SUMO is not installed, which lays out streets and simulates traffic: install Eclipse SUMO and put sumo and "
@@ -121,23 +122,18 @@ def run(
     SeipError
         The program fails.
     """
-    environment = os.environ | ({} if programs.home is None else {"SUMO_HOME": str(programs.home)})
-
-    process = subprocess.Popen(  # noqa: S603  # SUMO's program, found by its name, and our arguments
-        [str(program.absolute()), *(part.name if isinstance(part, Path) else str(part) for part in arguments)],
-        cwd=folder,
-        env=environment,
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.PIPE,
-        text=True,
+    log, environment = (
+        folder / f"{program.stem}.log",
+        {} if programs.home is None else {"SUMO_HOME": str(programs.home)},
     )
+    command = [str(program.absolute()), *(part.name if isinstance(part, Path) else str(part) for part in arguments)]
+    steps = run_logged(command, log, lambda _: Progress(0, 0, what), folder=folder, environment=environment)
     try:
-        _, complaint = yield from in_thread(lambda _stop: process.communicate(), what)
-    finally:  # also if the generator is closed early
-        process.kill()
-        process.wait()
-    if process.returncode != 0:
+        status = yield from steps
+        complaint = log.read_text(encoding="utf-8", errors="replace")
+    finally:
+        log.unlink(missing_ok=True)
+    if status != 0:
         raise SeipError(f"{program.name} failed: {_last_error(complaint)}; check the map, or simulate in SUMO itself")
 
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..base.counts import typed_number
+from ..base.counts import is_number
 from ..base.errors import SeipError
 from ..base.settings import setting
 from ..site.scene_geometry import DEFAULT_REFLECTIVITY, Mesh, SceneGeometry
@@ -97,18 +97,11 @@ def weather_of(words: Sequence[str]) -> Weather:
         name, _, number = word.partition("=")
         if word == "wet":
             given["wet_road"] = True
-        elif name in {"rain", "visibility"} and _is_number(number):
+        elif name in {"rain", "visibility"} and is_number(number):
             given[name] = float(number)
         else:
             raise SeipError(f"weather {word!r} is not understood: give rain=MM/H, visibility=METRES or wet")
     return Weather(**given)
-
-
-def _is_number(text: str) -> bool:
-    try:
-        return math.isfinite(typed_number(text))
-    except ValueError:
-        return False
 
 
 def _wet(mesh: Mesh) -> Mesh:

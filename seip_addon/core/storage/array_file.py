@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 import json
-import math
 import os
 import zipfile
 import zlib
@@ -15,7 +14,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.lib import format as npy
 from numpy.typing import NDArray
 
 from ..base.errors import SeipError
@@ -110,7 +108,7 @@ def _typed(array: NDArray[Any], kind: str) -> NDArray[Any]:
 def read_npz(path: Path, most: int) -> dict[str, NDArray[Any]]:
     """Return all arrays of an npz file of another program, by name.
 
-    Sizes are compared with the archive's and with the limit before any array is read.
+    The sizes of its members are compared with the limit before any is read; NumPy reads no more of one than there is.
 
     Raises
     ------
@@ -118,30 +116,12 @@ def read_npz(path: Path, most: int) -> dict[str, NDArray[Any]]:
         The file does not exist, is damaged, or holds more than ``most`` bytes of arrays.
     """
     try:
-        with path.open("rb") as file:
-            if _claimed_bytes(file) > most:
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as content:
+            if sum(member.file_size for member in content.zip.infolist()) > most:
                 raise ValueError(f"it holds more than {most / 1e6:,.0f} MB")
-            file.seek(0)
-            with np.load(file, allow_pickle=False) as content:
-                return {name: content[name] for name in content.files}
+            return {name: content[name] for name in content.files}
     except FileNotFoundError as error:
         raise SeipError(f"no such file: {path}; check its path") from error
     except READ_ERRORS as error:
         reason = f" ({error})" if isinstance(error, ValueError) else ""
         raise SeipError(f"{path.name} is damaged or not an npz file{reason[:200]}; write it again") from error
-
-
-def _claimed_bytes(file: io.BufferedReader) -> int:
-    """Return the bytes that the arrays of an archive claim; raise ValueError where that is not their size in it."""
-    total = 0
-    with zipfile.ZipFile(file) as archive:
-        for info in archive.infolist():
-            with archive.open(info) as member:
-                version = npy.read_magic(member)  # type: ignore[no-untyped-call]  # NumPy does not type these
-                read = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0
-                shape, _, dtype = read(member)  # type: ignore[no-untyped-call]
-                size = math.prod(shape) * dtype.itemsize
-                if size != info.file_size - member.tell():
-                    raise ValueError(f"{info.filename} claims {size:,} bytes, which differs from its size in the file")
-                total += size
-    return total

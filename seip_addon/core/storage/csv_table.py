@@ -6,6 +6,7 @@ import csv
 import os
 from collections.abc import Iterable, Sequence
 
+from ..base.counts import is_number
 from .files import whole_file
 
 _FORMULA_STARTS = ("=", "+", "-", "@", "\t", "\n", "\N{FULLWIDTH EQUALS SIGN}", "\N{FULLWIDTH PLUS SIGN}")
@@ -34,12 +35,4 @@ def _cell(value: object) -> object:
     value = value.replace("\r", " ")  # the csv module leaves it unquoted, and readers take it for a new row
     if not value.lstrip(" ").startswith(_FORMULA_STARTS):
         return value
-    return value if all(map(_is_number, value.split())) else f"'{value}"
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
+    return value if all(map(is_number, value.split())) else f"'{value}"

@@ -26,7 +26,7 @@ os.umask(_UMASK)
 _PREFIX = ".seip-"  # start of the names of unfinished files, followed by the id of the process that writes them
 _MARK = secrets.token_hex(4)  # mark of this process: in a container an earlier one may have had the same id
 _STALE_SECONDS = 86400.0  # age of abandoned unfinished files on systems where processes cannot be queried
-_LOCK_NAME = ".seip-lock"  # lock file in a folder, on systems that cannot open folders as files
+_LOCK_NAME = ".seip-lock"  # start of the names of lock files: of a file, or of a folder that cannot be opened as a file
 _LOCK_ERRORS = {errno.EWOULDBLOCK, errno.EACCES, errno.EDEADLK}
 _SPACE_ERRORS = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}
 
@@ -99,15 +99,13 @@ def check_folder(folder: Path) -> tuple[Path, ...]:
     SeipError
         The folder cannot be created or written.
     """
-    made: tuple[Path, ...] = ()
-    try:
+    with _writing(folder):
         made = _make_folder(folder)
-        with tempfile.TemporaryFile(dir=folder):
-            pass
-    except OSError as error:
-        remove_empty(made)
-        reason = error.strerror or str(error)
-        raise SeipError(f"cannot write to {folder}: {reason}; choose a folder that you may write to") from error
+        try:
+            tempfile.TemporaryFile(dir=folder).close()
+        except OSError:
+            remove_empty(made)
+            raise
     return made
 
 
@@ -130,34 +128,35 @@ def _make_folder(folder: Path) -> tuple[Path, ...]:
 
 
 @contextmanager
-def locked_folder(folder: Path) -> Iterator[None]:
-    """Lock a folder against other processes while the block runs, or until this process ends, normally or not.
+def locked(path: Path, *, folder: bool) -> Iterator[None]:
+    """Lock a folder, or a file, against other processes while the block runs, or until this process ends in any way.
 
-    The folder is created if it is missing, and removed if it stays empty.
+    The folder, or that of the file, is created if it is missing, and removed if it stays empty.
 
     Raises
     ------
     SeipError
         Another process holds the lock, or the folder cannot be written.
     """
-    made = check_folder(folder)
-    windows = sys.platform == "win32"  # Windows cannot open folders as files
-    handle = os.open(folder / _LOCK_NAME, os.O_RDWR | os.O_CREAT) if windows else os.open(folder, os.O_RDONLY)
+    made = check_folder(path if folder else path.parent)
+    lock = path / _LOCK_NAME if folder else path.parent / f"{_LOCK_NAME}-{digest(path.name)[:16]}"
+    opened = folder and sys.platform != "win32"  # Windows cannot open folders as files
+    handle = os.open(path, os.O_RDONLY) if opened else os.open(lock, os.O_RDWR | os.O_CREAT)
     try:
         _lock(handle)
     except OSError as error:
         if error.errno in _LOCK_ERRORS:  # otherwise it is a file system without locks
             os.close(handle)
             raise SeipError(
-                f"another run is writing to {folder}: wait until it has ended, or choose another folder"
+                f"another run is writing to {path}: wait until it has ended, or choose another name"
             ) from error
     try:
         yield
     finally:
         os.close(handle)
-        if windows:
+        if not opened:
             with suppress(OSError):  # another process has it by now
-                (folder / _LOCK_NAME).unlink()
+                lock.unlink()
         remove_empty(made)
 
 
@@ -319,4 +318,4 @@ def _writing(path: Path) -> Iterator[None]:
     except OSError as error:
         reason = error.strerror or str(error)
         cure = "make room there" if error.errno in _SPACE_ERRORS else "choose a folder that you may write to"
-        raise SeipError(f"cannot write {path}: {reason}; {cure}") from error
+        raise SeipError(f"cannot write to {path}: {reason}; {cure}") from error

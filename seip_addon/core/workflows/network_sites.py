@@ -21,6 +21,7 @@ from ..base.distinct_names import distinct_names
 from ..base.errors import SeipError
 from ..base.limits import LATITUDE, LONGITUDE, WEIGHT, Limits
 from ..base.progress import Progress
+from ..choosing.placement.objective import Objective
 from ..geometry.geo_reference import GeoReference
 from ..geometry.solids import from_faces
 from ..geometry.tangent_plane import plan_metres
@@ -31,6 +32,7 @@ from ..world.openstreetmap.extract import Extract, Tags, cropped, read_extract, 
 from ..world.openstreetmap.site import STREET_REACH, ExtractPlace
 from ..world.streetscape.model import SiteModel
 from ..world.streetscape.parts import Part
+from .survey_settings import SurveySettings
 
 XML_CONTROL = {number: None for number in range(32) if number not in (9, 10, 13)}
 """Control characters, which XML cannot hold."""
@@ -110,6 +112,26 @@ class NetworkPlace:
     neighbours: tuple[tuple[float, float], ...] = ()
 
 
+@dataclass(frozen=True)
+class NetworkRequest:
+    """Choices of a network besides its places.
+
+    Parameters
+    ----------
+    budget : float, dollars
+    tolerance : float
+        Gap at which the search ends, as a share of the value.
+    objective : Objective
+        Criterion and largest number of sensors at each site.
+    """
+
+    budget: float
+    tolerance: float
+    approaches: float
+    settings: SurveySettings
+    objective: Objective
+
+
 def extract_places(
     path: Path, rules: Sequence[str], within: BaseGeometry | None, approaches: float
 ) -> Generator[Progress, None, tuple[NetworkPlace, ...]]:
@@ -122,8 +144,9 @@ def extract_places(
     """
     extract = yield from read_extract(path)
     junctions = selected_junctions(extract, rules, within)
-    places = [(one.name, one.latitude, one.longitude, 1.0, path) for one in junctions]
-    return _numbered(places, approaches)
+    return _numbered(
+        [NetworkPlace(one.name, "", one.latitude, one.longitude, 1.0, path) for one in junctions], approaches
+    )
 
 
 def table_places(path: Path, approaches: float) -> tuple[NetworkPlace, ...]:
@@ -152,15 +175,15 @@ def table_places(path: Path, approaches: float) -> tuple[NetworkPlace, ...]:
         if not there:
             raise SeipError(f"{path} row {line}: there is no file {_brief(str(source))}; correct the source")
         name = row.get("name") or f"Site at {numbers['latitude']:.5f}, {numbers['longitude']:.5f}"
-        places.append((name, numbers["latitude"], numbers["longitude"], numbers["weight"], source))
-    if not any(weight for _, _, _, weight, _ in places):
+        places.append(NetworkPlace(name, "", numbers["latitude"], numbers["longitude"], numbers["weight"], source))
+    if not any(place.weight for place in places):
         raise SeipError(f"{path}: the weight of every site is 0; give some site a positive weight")
     _check_apart(path, [line for line, _ in rows], places)
     return _numbered(places, approaches)
 
 
-def site_source(place: NetworkPlace, approaches: float, extract: Extract | None) -> tuple[str, bytes]:
-    """Return suffix and content of the file that a site is built from: its part of an extract, or the whole file.
+def site_source(place: NetworkPlace, approaches: float, extract: Extract | None) -> bytes:
+    """Return the content of the file that a site is built from: its part of an extract, or the whole file.
 
     Parameters
     ----------
@@ -169,8 +192,8 @@ def site_source(place: NetworkPlace, approaches: float, extract: Extract | None)
     """
     if extract is not None:
         reach = ExtractPlace(approaches=approaches).reach + STREET_REACH + 200.0  # as `site_of_extract` has it
-        return ".osm", extract_xml(cropped(extract, window(place.latitude, place.longitude, reach)))
-    return place.source.suffix, read_small(place.source, _MOST_BYTES, "divide it")
+        return extract_xml(cropped(extract, window(place.latitude, place.longitude, reach)))
+    return read_small(place.source, _MOST_BYTES, "divide it")
 
 
 def site_key(place: NetworkPlace, content: bytes, *settings: str) -> str:
@@ -240,18 +263,23 @@ def _faces(area: BaseGeometry, level: float) -> Float:
     return np.dstack([plan, np.full(plan.shape[:2], level)])
 
 
-def _numbered(places: Sequence[tuple[str, float, float, float, Path]], approaches: float) -> tuple[NetworkPlace, ...]:
+def _numbered(places: Sequence[NetworkPlace], approaches: float) -> tuple[NetworkPlace, ...]:
     """Return places with unique folders, and their neighbours."""
-    origin = places[0][1:3]
-    plane = plan_metres([(latitude, longitude) for _, latitude, longitude, _, _ in places], origin)
+    plane = _plane(places)
     tree = shapely.STRtree(shapely.points(plane))
-    folders = distinct_names(_folder_name(place[0]) for place in places)
+    folders = distinct_names(_folder_name(place.name) for place in places)
     found = []
-    for number, (name, latitude, longitude, weight, source) in enumerate(places):
+    for number, (place, folder) in enumerate(zip(places, folders, strict=True)):
         near = tree.query(shapely.Point(plane[number]), "dwithin", distance=NEIGHBOUR_REACH * approaches)
-        neighbours = tuple(places[other][1:3] for other in sorted(near.tolist()) if other != number)
-        found.append(NetworkPlace(name, folders[number], latitude, longitude, weight, source, neighbours))
+        others = (places[other] for other in sorted(near.tolist()) if other != number)
+        found.append(replace(place, folder=folder, neighbours=tuple((one.latitude, one.longitude) for one in others)))
     return tuple(found)
+
+
+def _plane(places: Sequence[NetworkPlace]) -> Float:
+    """Return metres east and north of the first place, (n, 2)."""
+    degrees = [(place.latitude, place.longitude) for place in places]
+    return plan_metres(degrees, degrees[0])
 
 
 def _folder_name(name: str) -> str:
@@ -303,9 +331,9 @@ def _number(path: Path, line: int, name: str, row: Mapping[str, str], limits: Li
     return value
 
 
-def _check_apart(path: Path, lines: Sequence[int], places: Sequence[tuple[str, float, float, float, Path]]) -> None:
+def _check_apart(path: Path, lines: Sequence[int], places: Sequence[NetworkPlace]) -> None:
     """Raise SeipError if two rows are the same site."""
-    plane = plan_metres([one[1:3] for one in places], places[0][1:3])
+    plane = _plane(places)
     points = shapely.points(plane)
     one, other = shapely.STRtree(points).query(points, "dwithin", distance=SAME_JUNCTION)
     same = next(((a, b) for a, b in zip(one.tolist(), other.tolist(), strict=True) if a < b), None)

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Generator, Mapping
+from collections.abc import Callable, Generator, Mapping
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..base.acceptance import Acceptance, until_accepted
+from ..base.arrays import Integer
 from ..base.errors import SeipError
 from ..base.progress import Progress
 from ..choosing.placement.cheapest import UNPROVEN_PRICE, cheapest_for_share
@@ -26,7 +27,7 @@ from ..choosing.placement.objective import (
     placement_problem,
     with_count,
 )
-from ..choosing.placement.problem import Placement
+from ..choosing.placement.problem import Placement, PlacementProblem
 from ..choosing.placement.returns_summary import ReturnsPoint
 from ..choosing.placement.risk import NOMINAL, Risk
 from ..choosing.placement.scenarios import Scenarios
@@ -38,7 +39,7 @@ from ..choosing.robustness.pose_study import pose_study
 from ..choosing.robustness.robust_problem import RobustProblem
 from ..sensing.lidar.model import LidarModel
 from ..site.site import Site
-from .returns import crossing_returns, place_by_returns, survey_returns
+from .returns import crossing_returns, survey_returns
 from .survey import Survey, surroundings
 from .traffic_runs import TrafficRuns
 
@@ -71,11 +72,18 @@ def optimise(
         placement = yield from cheapest_for_share(problem, objective.coverage, limits, problem.describe_road)
         greedy = None
     else:
-        instance = make_instance(problem)
-        placement = yield from solve_instance(problem, instance, limits, describe=problem.describe_road)
-        greedy = solve_greedy(problem, instance)
+        placement, greedy = yield from _searched(problem, problem.describe_road, limits)
     deployment = deploy(site, models, visible[placement.chosen], placement.chosen)
     return Solution(with_count(objective, site), placement, greedy, deployment)
+
+
+def _searched(
+    problem: PlacementProblem, describe: Callable[[Integer, float], str], limits: SolverLimits
+) -> Generator[Progress, None, tuple[Placement, Placement]]:
+    """Return the best placement that a search finds, and that of the greedy algorithm."""
+    instance = make_instance(problem)
+    placement = yield from solve_instance(problem, instance, limits, describe=describe)
+    return placement, solve_greedy(problem, instance)
 
 
 def place(
@@ -100,7 +108,9 @@ def place(
     if measure is not None:
         solution = yield from _over_scenarios(survey, objective, limits, measure, runs)
     elif criterion_of(objective, survey.models) == "returns":
-        solution = yield from place_by_returns(survey, objective, limits)
+        returns = yield from survey_returns(survey, objective)
+        placement, greedy = yield from _searched(returns.problem(), returns.describe, limits)
+        solution = returns.solution(survey, placement, greedy)
     else:
         solution = yield from optimise(survey.site, survey.grid.visible, survey.models, objective, limits)
     deployment = yield from with_gain_band(surroundings(survey), solution.deployment)

@@ -14,7 +14,6 @@ from ..base.arrays import Float, Integer
 from ..base.errors import SeipError
 from ..base.progress import Progress
 from ..choosing.placement.concave import LOG_RETURNS
-from ..choosing.placement.instance import make_instance
 from ..choosing.placement.objective import (
     CHOSEN_FOR,
     Objective,
@@ -25,8 +24,6 @@ from ..choosing.placement.objective import (
 )
 from ..choosing.placement.problem import Placement, PlacementProblem
 from ..choosing.placement.returns_summary import ENOUGH_RETURNS, CrossingReturns, ReturnsSummary
-from ..choosing.placement.search_limits import SolverLimits
-from ..choosing.placement.solver import solve_greedy, solve_instance
 from ..sensing.returns.expected_returns import expected_returns
 from ..sensing.returns.occlusion import returns_in_traffic
 from ..sensing.returns.returns_grid import ReturnsGrid, returns_key, stored_returns
@@ -161,21 +158,6 @@ def survey_returns(
     users, engine = road_users(survey.geometry), survey.settings.engine
     grid = yield from stored_returns(survey.returns_path, survey.site, users, survey.models, engine, threads)
     return SurveyReturns(survey, objective, users, grid)
-
-
-def place_by_returns(survey: Survey, objective: Objective, limits: SolverLimits) -> Generator[Progress, None, Solution]:
-    """Choose the placement with the most returns from road users.
-
-    Raises
-    ------
-    SeipError
-        Same as for `placement_problem` and `solve`.
-    """
-    returns = yield from survey_returns(survey, objective)
-    problem = returns.problem()
-    instance = make_instance(problem)
-    placement = yield from solve_instance(problem, instance, limits, describe=returns.describe)
-    return returns.solution(survey, placement, solve_greedy(problem, instance))
 
 
 def crossing_returns(survey: Survey, solution: Solution) -> tuple[CrossingReturns, ...]:

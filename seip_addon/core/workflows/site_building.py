@@ -159,12 +159,8 @@ def save_map(built: BuiltSite, path: Path) -> None:
         The file cannot be written.
     """
     if built.map_text is not None:
-        _write_map(built.map_text, path)
-
-
-def _write_map(text: str, path: Path) -> None:
-    with whole_file(path) as temporary:
-        temporary.write_text(text, encoding="utf-8")
+        with whole_file(path) as temporary:
+            temporary.write_text(built.map_text, encoding="utf-8")
 
 
 def _of_extract(source: Path, request: SiteRequest, map_path: Path | None) -> Generator[Progress, None, BuiltSite]:
@@ -192,7 +188,8 @@ def _of_extract(source: Path, request: SiteRequest, map_path: Path | None) -> Ge
     except UnclearLevelError as error:
         if map_path is None:
             raise
-        _write_map(credited(site.network.text, site.description.attribution), map_path)
+        with whole_file(map_path) as temporary:
+            temporary.write_text(credited(site.network.text, site.description.attribution), encoding="utf-8")
         raise UnclearLevelError(f"{error}; {map_path} is written: the map of the streets there") from error
     map_text = credited(site.network.text, model.attribution)
     return BuiltSite(source.name, replace(model, notes=(*site.notes, *more, *model.notes)), map_text)

@@ -8,7 +8,6 @@ from collections.abc import Generator, Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
 
 from ..base.counts import counted
 from ..base.errors import SeipError
@@ -16,7 +15,8 @@ from ..base.progress import Progress, within
 from ..base.settings import setting
 from ..sensing.traffic.trajectories import Trajectories
 from ..site.scene_geometry import SceneGeometry
-from ..storage.files import content_fault, locked_folder, parse_json, read_small, save_json, unfinished_name
+from ..storage.files import content_fault, locked, parse_json, read_small, save_json, unfinished_name
+from ..storage.json_dataclass import as_json
 from ..world.traffic_simulation.demand import Demand
 from ..world.traffic_simulation.simulation import Scenario, SignalPlan, SimulatedRun, simulate_run
 from .traffic_runs import runs_in
@@ -125,7 +125,7 @@ def simulate_runs(
     """
     if count < 1:
         raise SeipError(f"the number of runs must be 1 or more, not {count}")
-    with locked_folder(folder):
+    with locked(folder, folder=True):
         earlier = _earlier_runs(folder)
         runs: list[SimulatedRun] = []
         with TemporaryDirectory(prefix=unfinished_name(folder, "runs-").name, dir=folder) as temporary:
@@ -136,7 +136,7 @@ def simulate_runs(
                 run.trajectories.save(Path(temporary) / _name(number + 1))
                 runs.append(run)
             names = [_name(number + 1) for number in range(count)]
-            save_json(folder / SIMULATION, _record(map_path, settings, names))
+            save_json(folder / SIMULATION, {"map": map_path.name, "settings": as_json(settings), "runs": names})
             for name in names:
                 (Path(temporary) / name).replace(folder / name)
             for path in earlier:
@@ -153,20 +153,6 @@ def simulate_runs(
 
 def _name(seed: int) -> str:
     return f"run-{seed}.npz"
-
-
-def _record(map_path: Path, settings: SimulationSettings, names: list[str]) -> dict[str, Any]:
-    demand = settings.demand
-    return {
-        "map": map_path.name,
-        "flow": demand.flow,
-        "turns": list(demand.turns),
-        "pedestrians": demand.pedestrians,
-        "green": settings.signals.green,
-        "duration": settings.duration,
-        "warm_up": settings.warm_up,
-        "runs": names,
-    }
 
 
 def _earlier_runs(folder: Path) -> list[Path]:

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Generator, Sequence
+from collections.abc import Generator, Mapping, Sequence
 from dataclasses import replace
 from itertools import chain, count
+from typing import TypeVar
 
 import numpy as np
 import shapely
@@ -26,7 +27,7 @@ from ..sensing.recordings.comparison import (
     gone_objects,
     new_objects,
 )
-from ..sensing.recordings.recording import Recording, SensorRecording
+from ..sensing.recordings.recording import Recording
 from ..sensing.recordings.registration import Registration, register
 from ..sensing.recordings.unit_gain import fitted_gain
 from ..sensing.recordings.verification import (
@@ -44,6 +45,8 @@ from ..sensing.visibility.settings import Engine, VisibilitySettings
 from ..sensing.visibility.visibility_model import VisibilityModel
 from ..site.scene_geometry import FROM_SURVEY, Mesh, SceneGeometry, joined
 from ..site.targets import Targets, generate_targets
+
+Known = TypeVar("Known")
 
 _FOUND = re.compile(r"Found (\d{1,9})\b")  # name of an object that a verification added
 _BOX_MARGIN = 1.0  # metres around a box that an earlier verification added
@@ -75,7 +78,8 @@ def verify(
     SeipError
         The recording has a sensor that is not planned, is of another site, or is too short.
     """
-    pairs = _paired(planned, recording)
+    own = of_recorded(recording, {one.label: one for one in planned}, "the plan")
+    pairs = [(own[record.name], record) for record in recording.sensors]
     static = static_scene(geometry, planned)
     surface = _surface(static, engine)
     fitted: list[tuple[Registration, Background]] = []
@@ -152,18 +156,24 @@ def _installed(pose: Registration, background: Background, gain: Gain | None) ->
     )
 
 
-def _paired(planned: Sequence[MountedSensor], recording: Recording) -> list[tuple[MountedSensor, SensorRecording]]:
-    """Return the planned sensor of each sensor of a recording."""
-    by_label = {one.label: one for one in planned}
-    if len(planned) == len(recording.sensors) == 1:
-        return [(planned[0], recording.sensors[0])]
-    unknown = [record.name for record in recording.sensors if record.name not in by_label]
+def of_recorded(recording: Recording, known: Mapping[str, Known], whose: str) -> dict[str, Known]:
+    """Return what is known by label of the sensors of a recording, by their names; one sensor may have any name.
+
+    Raises
+    ------
+    SeipError
+        A sensor has the label of none; ``whose`` says what the labels are from.
+    """
+    names = [record.name for record in recording.sensors]
+    if len(names) == len(known) == 1:
+        return dict(zip(names, known.values(), strict=True))
+    unknown = [name for name in names if name not in known]
     if unknown:
         raise SeipError(
-            f"the plan has the sensors {', '.join(by_label)}, but the recording has {', '.join(unknown)}: name the "
-            "folders of sweeps after the sensors"
+            f"{whose} has the sensors {', '.join(known)}, but the recording has {', '.join(unknown)}: name the folders "
+            "of sweeps after the sensors"
         )
-    return [(by_label[record.name], record) for record in recording.sensors]
+    return {name: known[name] for name in names}
 
 
 def _first_number(geometry: SceneGeometry) -> int:

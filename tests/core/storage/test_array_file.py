@@ -83,7 +83,7 @@ def test_a_claim_of_64_gib_in_a_foreign_file_costs_no_memory(tmp_path):
         preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (8 << 30, 8 << 30)),
     )
     assert done.returncode == 0, done.stderr
-    assert "claims 68,719,476,736 bytes" in done.stdout
+    assert "sweep.npz is damaged or not an npz file" in done.stdout
 
 
 def test_a_huge_attribute_is_refused_at_once(tmp_path):

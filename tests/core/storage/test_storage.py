@@ -12,12 +12,13 @@ from seip_addon.core.base.errors import SeipError
 from seip_addon.core.sensing.lidar.catalogue import load_catalogue
 from seip_addon.core.site.installed_cost import load_installed_cost
 from seip_addon.core.storage.csv_table import save_csv
-from seip_addon.core.storage.files import locked_folder, save_json, whole_file
+from seip_addon.core.storage.files import locked, save_json, whole_file
 from seip_addon.core.world.streetscape.site_file import read_site_description
 
 ROOT = Path(__file__).resolve().parents[3]
 HOLD = "import sys, time; from pathlib import Path; from seip_addon.core.storage.files import *; "
-LOCK = HOLD + "part = locked_folder(Path(sys.argv[1])); part.__enter__(); print('held', flush=True); time.sleep(60)"
+LOCK = HOLD + "path = Path(sys.argv[1]); part = locked(path, folder=path.is_dir()); part.__enter__(); "
+LOCK += "print('held', flush=True); time.sleep(60)"
 WRITE = HOLD + "part = whole_file(Path(sys.argv[1]) / 'a.json'); print(part.__enter__(), flush=True); time.sleep(60)"
 
 
@@ -39,18 +40,23 @@ def other():
         process.stdout.close()
 
 
-def test_a_folder_that_another_run_writes_to_is_refused_until_that_ends_however_it_ends(tmp_path, other):
-    process, said = other(LOCK, tmp_path)
+@pytest.mark.parametrize("name", [".", "site.blend"])
+def test_what_another_run_writes_to_is_refused_until_that_ends_however_it_ends(tmp_path, other, name):
+    path, folder = tmp_path / name, name == "."
+    process, said = other(LOCK, path)
     assert said == "held"
     with (
         pytest.raises(SeipError, match=r"another run is writing to .*: wait until it has ended"),
-        locked_folder(tmp_path),
+        locked(path, folder=folder),
     ):
+        pass
+    with locked(tmp_path / "other.blend", folder=False):
         pass
     process.send_signal(signal.SIGKILL)
     process.wait()
-    with locked_folder(tmp_path):
-        assert list(tmp_path.iterdir()) == []
+    with locked(path, folder=folder):
+        pass
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_the_next_run_removes_what_a_killed_one_left_and_nothing_else(tmp_path, other):
@@ -70,7 +76,7 @@ def test_the_next_run_removes_what_a_killed_one_left_and_nothing_else(tmp_path, 
 
 def test_a_folder_that_is_made_for_a_file_goes_with_it(tmp_path):
     path = tmp_path / "a" / "b" / "file.json"
-    with pytest.raises(ZeroDivisionError), locked_folder(path.parent), whole_file(path):
+    with pytest.raises(ZeroDivisionError), locked(path.parent, folder=True), whole_file(path):
         raise ZeroDivisionError
     assert list(tmp_path.iterdir()) == []
     (tmp_path / "a").mkdir()

@@ -78,7 +78,7 @@ def test_key_of_a_site_changes_with_its_surroundings_only(two_junctions, tmp_pat
     extract = finish(read_extract(two_junctions))
 
     def key(changed):
-        return site_key(first, site_source(first, 40.0, changed)[1], "settings")
+        return site_key(first, site_source(first, 40.0, changed), "settings")
 
     def renamed(name):
         number = next(number for number, way in extract.ways.items() if way.tags["name"] == name)
@@ -87,7 +87,7 @@ def test_key_of_a_site_changes_with_its_surroundings_only(two_junctions, tmp_pat
 
     assert key(extract) == key(renamed("Far Lane"))
     assert key(extract) != key(renamed("First Lane"))
-    assert key(extract) != site_key(first, site_source(first, 40.0, extract)[1], "other settings")
+    assert key(extract) != site_key(first, site_source(first, 40.0, extract), "other settings")
 
 
 def test_road_and_positions_between_neighbours_are_divided_exactly(tmp_path):

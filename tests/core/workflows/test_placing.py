@@ -90,14 +90,6 @@ def test_an_accepted_placement_has_one_note_on_the_end_of_its_search(small_surve
     assert [note for note in placement.notes if "search" in note] == [ACCEPTED_MESSAGE]
 
 
-def test_acceptance_ends_the_search_for_other_numbers_of_sensors(small_survey):
-    solution = finish(place(small_survey, Objective(count=2, criterion="returns")))
-    acceptance = Acceptance()
-    solution, rest = steps_to_end(with_context(small_survey, solution, acceptance), acceptance, 2)
-    assert rest == 0
-    assert solution.deployment.returns.front == ()
-
-
 @pytest.mark.parametrize("criterion", ["road", "returns"])
 def test_front_has_the_solution_at_its_own_number_and_more_sensors_are_never_worse(small_survey, criterion):
     solution = finish(place(small_survey, Objective(count=2, criterion=criterion)))

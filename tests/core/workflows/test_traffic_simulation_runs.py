@@ -9,6 +9,7 @@ import pytest
 from seip_addon.core.base.errors import SeipError
 from seip_addon.core.base.progress import Progress, finish
 from seip_addon.core.sensing.traffic.trajectories import Trajectories
+from seip_addon.core.storage.json_dataclass import as_json
 from seip_addon.core.workflows import traffic_simulation
 from seip_addon.core.workflows.traffic_simulation import SIMULATION, SimulationSettings, simulate_runs
 from seip_addon.core.world.traffic_simulation.demand import Demand
@@ -53,7 +54,7 @@ def test_runs_have_the_seeds_from_1_and_the_settings_of_the_request(tmp_path, st
     users = sum(len(make_run(seed, 5.0)) for seed in (1, 2, 3))
     assert done.summary == f"3 runs, {users} road users (3 left out, having run into others)"
     record = json.loads((tmp_path / "runs" / SIMULATION).read_text(encoding="utf-8"))
-    assert (record["flow"], record["pedestrians"], record["duration"], record["warm_up"]) == (450.0, 10.0, 30.0, 7.0)
+    assert record["settings"] == as_json(settings)
     assert (record["map"], record["runs"]) == ("map.xodr", ["run-1.npz", "run-2.npz", "run-3.npz"])
 
 

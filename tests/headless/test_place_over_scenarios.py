@@ -1,4 +1,4 @@
-"""Placement over pose errors and sensor failures by the command, from a scene to the folder of its result."""
+"""Placement over pose errors, failures and traffic by the command, from a scene to the folder of its result."""
 
 import json
 from unittest.mock import patch
@@ -9,7 +9,7 @@ import pytest
 
 from seip_addon.core.base.errors import SeipError
 from seip_addon.core.choosing.placement.scenarios import DEFAULT_COUNTS
-from seip_addon.core.output.results.file_names import POSE_ERROR_PICTURES
+from seip_addon.core.output.results.file_names import POSE_ERROR_PICTURES, TRAFFIC_PICTURE
 from seip_addon.scene.result_folder import FILES
 
 COARSE = ["--sensor", "type1", "--heights", "5.4", "--grid", "8", "--spacing", "25", "--no-render"]
@@ -77,3 +77,21 @@ def test_a_number_out_of_its_limits_is_named_before_any_work(tmp_path, option, s
     with pytest.raises(SeipError, match=sentence):
         run(tmp_path / "out", *option)
     assert not (tmp_path / "out").exists()
+
+
+IN_TRAFFIC = ["--sensor", "vlp16", "--heights", "5.4", "--grid", "8", "--spacing", "25", "--no-render", "--traffic"]
+
+
+def test_it_writes_a_result_and_says_what_traffic_hides(small_scene, tmp_path, capsys):
+    with patch.dict(DEFAULT_COUNTS, traffic=(4, 24)):
+        place.main([str(small_scene), "-o", str(tmp_path), *IN_TRAFFIC, "--count", "2"])
+    names = {path.name for path in tmp_path.iterdir()}
+    assert {*FILES, TRAFFIC_PICTURE, "visibility.npz"} - {"view.png"} <= names
+    record = json.loads((tmp_path / "placement.json").read_text(encoding="utf-8"))
+    goal, notes = record["settings"]["goal"], record["notes"]
+    assert goal["scenarios"]["kind"] == "traffic"
+    assert "in traffic, on average over 4 instants" in notes[0]
+    said = capsys.readouterr().out
+    assert "chosen for the empty road: " in said
+    assert "vehicles of one run within 1 m of one of another at the same instant: " in said
+    assert any(note.startswith("this placement sees ") and note in said for note in notes)
