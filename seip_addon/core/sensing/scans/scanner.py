@@ -16,7 +16,7 @@ from ...base.arrays import Boolean, Float, Integer
 from ..lidar.beams import BeamPattern
 from ..lidar.noisy_returns import return_chance
 from ..visibility.ray_casting import RayCaster
-from .beam_culling import BeamWindows
+from .beam_culling import rays_towards
 from .frame import STATIC_INSTANCE
 from .motion import Motion
 from .sensor import MountedSensor
@@ -180,7 +180,6 @@ class Scanner:
         self.delay = sensor.model.delay(np.arange(sensor.model.channels * sensor.model.azimuth_count))
         self._model = sensor.model
         rays = np.arange(len(self.delay))
-        self._windows = BeamWindows(self._model)
         self.directions: Float = BeamPattern(self._model).directions(rays) @ sensor.orientation.T
         self.coarse_directions: NDArray[np.float32] = self.directions.astype(np.float32)
         self._distance = np.full(len(rays), np.inf)
@@ -224,7 +223,7 @@ class Scanner:
         if not traffic.motions:
             return
         # the rays towards all hulls at once; they come sorted by hull, so that each road user's rays are one slice
-        hull, ray = self._windows.rays_towards((traffic.hulls - self.sensor.xyz) @ self.sensor.orientation)
+        hull, ray = rays_towards(self._model, (traffic.hulls - self.sensor.xyz) @ self.sensor.orientation)
         first = np.searchsorted(hull, np.arange(len(traffic.motions) + 1))
         for number, (motion, shape) in enumerate(zip(traffic.motions, traffic.shapes, strict=True)):
             yield motion, self._cast_at(shape, motion, ray[first[number] : first[number + 1]])
