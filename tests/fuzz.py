@@ -456,13 +456,13 @@ def _read_poses(path: Path, _: bytes) -> None:
 
 
 def _box_labels(_: Path) -> list[bytes]:
-    from seip_addon.core.output.datasets.formats import kitti_results, openpcdet_results  # noqa: PLC0415
+    from seip_addon.core.output.datasets.formats import openpcdet_results  # noqa: PLC0415
 
     kinds = ["car", "bus", "pedestrian"]
     boxes = np.array(
         [[10.0, -5.0, 0.8, 4.5, 1.8, 1.6, 0.3], [30, 4, 1.5, 12, 2.5, 3, -2], [7, 7, 0.9, 0.6, 0.7, 1.8, 1]]
     )
-    return [results(boxes, kinds, np.ones(3)).encode() for results in (kitti_results, openpcdet_results)]
+    return [openpcdet_results(boxes, kinds, np.ones(3)).encode()]
 
 
 def _read_box_labels(path: Path, _: bytes) -> None:
