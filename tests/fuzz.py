@@ -216,12 +216,11 @@ def _mutate_floating_car_data(random: Random, content: bytes) -> bytes:
 
 def _read_floating_car_data(path: Path, _: bytes) -> None:
     from seip_addon.core.base.progress import finish  # noqa: PLC0415
-    from seip_addon.core.sensing.traffic.floating_car_data import read_floating_car_data, read_trajectories  # noqa: PLC0415
+    from seip_addon.core.sensing.traffic.floating_car_data import read_floating_car_data  # noqa: PLC0415
     from seip_addon.core.sensing.traffic.trajectories import Trajectories  # noqa: PLC0415
     from seip_addon.core.sensing.traffic.vehicle_types import BUILT_IN  # noqa: PLC0415
 
-    data = finish(read_floating_car_data(path))
-    got, _ = read_trajectories(data, BUILT_IN, np.zeros(3), "fuzz")
+    got = finish(read_floating_car_data(path, BUILT_IN, np.zeros(3), "fuzz")).trajectories
     ground = replace(got, position=np.where(np.isnan(got.position), 0.0, got.position))
     require_physical(ground, most=1e11)
     ground.save(path.with_suffix(".npz"))
