@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 from seip_addon.core.base.errors import SeipError
 from seip_addon.core.base.progress import finish
 from seip_addon.core.sensing.traffic.overlaps import find_overlaps, footprints, without_overlaps
-from seip_addon.core.sensing.traffic.road_fit import ROAD_TOLERANCE, fit_to_road
-from seip_addon.core.sensing.traffic.smooth_walks import smooth_walks
+from seip_addon.core.sensing.traffic.road_fit import ROAD_TOLERANCE, fit_to_road, smooth_walks
 from seip_addon.core.sensing.traffic.trajectories import RoadUser, Trajectories
 from seip_addon.core.site.scene_geometry import Mesh, SceneGeometry
 from tests.oracles.random_cases import cases
