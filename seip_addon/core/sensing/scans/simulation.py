@@ -86,15 +86,6 @@ class Simulation:
         self._static, self._trajectories, self._shapes, self._settings = static, trajectories, shapes, settings
         self._revolution = max(1.0 / scanner.sensor.model.rotation_rate for scanner in scanners)
 
-    def part(self, sensors: Sequence[int]) -> Simulation:
-        """Return the simulation of some of the sensors, by their numbers, which shares their scanners.
-
-        Its `measure` makes the same frames of the sensors' scans as a simulation of these sensors alone: noise and
-        losses follow from the place of a sensor in the part.
-        """
-        scanners = [self.scanners[number] for number in sensors]
-        return Simulation(self._static, scanners, self._trajectories, self._shapes, self._settings)
-
     @property
     def warnings(self) -> tuple[str, ...]:
         """Warnings about the scans."""
