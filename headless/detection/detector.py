@@ -148,8 +148,7 @@ class Detector(nn.Module):
         state = load_state(path)
         with reading_detector(path):
             known = dict(state["settings"])
-            if known.pop("head", "centre") != "centre":  # files of earlier versions name one of two heads
-                raise SeipError("it has anchors, which are no longer supported")
+            known.pop("head", None)  # files of earlier versions name one of two heads
             settings = NetworkSettings(**{**known, "blocks": tuple(known["blocks"])})
             experience = {name: tuple(names) for name, names in state["experience"].items()}
             detector = cls(settings, training_record=TrainingRecord(**experience))
