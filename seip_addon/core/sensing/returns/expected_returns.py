@@ -95,7 +95,7 @@ def expected_returns(
     """
     if is_upright(orientation):
         return upright_returns(caster, origin, yaw_of(orientation), model, users)
-    return all_ray_returns(caster, origin, orientation, model, users)
+    return _all_ray_returns(caster, origin, orientation, model, users)
 
 
 def upright_returns(
@@ -142,22 +142,10 @@ def upright_returns(
     return _summed(item, chance * number, users), len(cast)
 
 
-def all_ray_returns(
+def _all_ray_returns(
     caster: RayCaster, origin: Float, orientation: Float, model: LidarModel, users: RoadUsers
 ) -> tuple[Float, int]:
-    """Compute the expected returns of a sensor of any pattern and orientation from each road user.
-
-    Parameters
-    ----------
-    orientation : (3, 3) float64
-        Rotation from the sensor's axes to the site's.
-
-    Returns
-    -------
-    returns : (m,) float64
-    cast : int
-        Number of rays.
-    """
+    """Compute the expected returns of a sensor of any orientation; see `expected_returns`."""
     panels = PanelRows.seen_from(origin, users)
     directions = BeamPattern(model).directions(np.arange(model.channels * model.azimuth_count)) @ orientation.T
     level = np.hypot(directions[:, 0], directions[:, 1])
