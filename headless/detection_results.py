@@ -96,8 +96,9 @@ def save_charts(
     save_parts_chart(folder / "where.png", panels, name)
     types = " + ".join(sorted({sensor.model.key for sensor in sensors}))
     count = len(sensors)
-    curve, label = precision_recall(evaluation), f"{count} × {types}: AP {evaluation.average_precision:.2f}"
-    save_precision_recall_chart(folder / "precision_recall.png", curve.recall, curve.precision, label, name)
+    label = f"{count} × {types}: AP {evaluation.average_precision:.2f}"
+    _, precision, recall = precision_recall(evaluation)
+    save_precision_recall_chart(folder / "precision_recall.png", recall, precision, label, name)
     frame = outcome.frames[outcome.fullest]
     places = np.array([sensor.xyz for sensor in sensors])
     cloud = outcome.scan.points

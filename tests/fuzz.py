@@ -216,12 +216,11 @@ def _mutate_floating_car_data(random: Random, content: bytes) -> bytes:
 
 def _read_floating_car_data(path: Path, _: bytes) -> None:
     from seip_addon.core.base.progress import finish  # noqa: PLC0415
-    from seip_addon.core.sensing.traffic.floating_car_data import read_floating_car_data, read_trajectories  # noqa: PLC0415
+    from seip_addon.core.sensing.traffic.floating_car_data import read_floating_car_data  # noqa: PLC0415
     from seip_addon.core.sensing.traffic.trajectories import Trajectories  # noqa: PLC0415
     from seip_addon.core.sensing.traffic.vehicle_types import BUILT_IN  # noqa: PLC0415
 
-    data = finish(read_floating_car_data(path))
-    got, _ = read_trajectories(data, BUILT_IN, np.zeros(3), "fuzz")
+    got = finish(read_floating_car_data(path, BUILT_IN, np.zeros(3), "fuzz")).trajectories
     ground = replace(got, position=np.where(np.isnan(got.position), 0.0, got.position))
     require_physical(ground, most=1e11)
     ground.save(path.with_suffix(".npz"))
@@ -456,13 +455,13 @@ def _read_poses(path: Path, _: bytes) -> None:
 
 
 def _box_labels(_: Path) -> list[bytes]:
-    from seip_addon.core.output.datasets.formats import kitti_results, openpcdet_results  # noqa: PLC0415
+    from seip_addon.core.output.datasets.formats import openpcdet_results  # noqa: PLC0415
 
     kinds = ["car", "bus", "pedestrian"]
     boxes = np.array(
         [[10.0, -5.0, 0.8, 4.5, 1.8, 1.6, 0.3], [30, 4, 1.5, 12, 2.5, 3, -2], [7, 7, 0.9, 0.6, 0.7, 1.8, 1]]
     )
-    return [results(boxes, kinds, np.ones(3)).encode() for results in (kitti_results, openpcdet_results)]
+    return [openpcdet_results(boxes, kinds, np.ones(3)).encode()]
 
 
 def _read_box_labels(path: Path, _: bytes) -> None:

@@ -120,21 +120,6 @@ class CountedTruth:
 
 
 @dataclass(frozen=True, eq=False)
-class PrecisionRecall:
-    """Precision and recall at each score that a detection has, the highest first.
-
-    Parameters
-    ----------
-    score, precision, recall : (s,) float64
-        Of all detections with at least that score: the share that are hits, and the share of road users they find.
-    """
-
-    score: Float
-    precision: Float
-    recall: Float
-
-
-@dataclass(frozen=True, eq=False)
 class Evaluation:
     """Detections of all frames matched to the ground truth by one rule.
 
@@ -156,8 +141,7 @@ class Evaluation:
         All-point interpolation of PASCAL VOC 2010, on all detections of all frames in one order. Equal scores make one
         point of the curve: no threshold can tell them apart.
         """
-        alike = np.zeros(len(self.detections), dtype=np.int64)
-        return float(_areas(self, np.ones((1, 1)), alike, np.array([float(len(self.wanted))]))[0])
+        return float(average_precisions_of_runs(self, np.ones((1, int(self.run.max()) + 1)))[0])
 
 
 def evaluate(frames: Sequence[FrameResult], rule: Rule) -> Evaluation:
@@ -179,12 +163,15 @@ def evaluate(frames: Sequence[FrameResult], rule: Rule) -> Evaluation:
     return Evaluation(rule, _evaluated(frames, matches), _wanted(frames, matches), run)
 
 
-def precision_recall(evaluation: Evaluation) -> PrecisionRecall:
-    """Return precision and recall at each score."""
+def precision_recall(evaluation: Evaluation) -> tuple[Float, Float, Float]:
+    """Return each score that a detection has, the highest first, with precision and recall, (s,) each.
+
+    Of all detections with at least that score, they are the share that are hits, and the share of road users they find.
+    """
     detections = evaluation.detections
     last = _last_of_equals(detections.score)
     hits = np.cumsum(detections.hit)[last]
-    return PrecisionRecall(detections.score[last], hits / (last + 1), hits / max(len(evaluation.wanted), 1))
+    return detections.score[last], hits / (last + 1), hits / max(len(evaluation.wanted), 1)
 
 
 def average_precision_interval(evaluation: Evaluation) -> Interval | None:
@@ -211,16 +198,31 @@ def average_precisions_without_each_run(evaluation: Evaluation) -> Float | None:
 
 
 def average_precisions_of_runs(evaluation: Evaluation, times: Float | Integer) -> Float:
-    """Return the average precision where runs come several times or not at all, (b,).
+    """Return the average precision where runs come several times or not at all, (b,); NaN without road users.
 
     Parameters
     ----------
     times : (b, r) array
-        How often each of the r runs is there; all at once, so few rows at a time take less memory.
+        How often each of the r runs is there.
     """
-    of_detection = evaluation.run[evaluation.detections.frame]
-    wanted = np.bincount(evaluation.run[evaluation.wanted.frame], minlength=times.shape[1])
-    return _areas(evaluation, times.astype(np.float64), of_detection, times @ wanted)
+    detections, run = evaluation.detections, evaluation.run
+    wanted = times @ np.bincount(run[evaluation.wanted.frame], minlength=times.shape[1])
+    # Detections are sorted by score, so the first k of them are those above a threshold, and cumulative sums give hits
+    # and detections at all thresholds. Runs may come several times without matching again: matches are within frames.
+    # Precision falls from one hit to the next, so that only scores with a hit can hold the best precision at a recall
+    # or beyond; the others, which are most, are left out.
+    last = _last_of_equals(detections.score)
+    last = last[np.diff(np.cumsum(detections.hit)[last], prepend=0) > 0]
+    belongs = np.arange(times.shape[1])[:, None] == run[detections.frame]
+    hits, found = (
+        times @ np.cumsum(some, axis=1)[:, last].astype(np.float64) for some in (belongs & detections.hit, belongs)
+    )
+    precision = np.divide(hits, found, out=np.zeros(hits.shape), where=found > 0)
+    # All-point interpolation: the best precision at this or a larger recall. The area is then a sum over steps of
+    # recall, which is hits over the number of road users; the sum is over steps of hits, and divided at the end.
+    best_from_here = np.maximum.accumulate(precision[:, ::-1], axis=1)[:, ::-1]
+    areas = (np.diff(hits, axis=1, prepend=0) * best_from_here).sum(axis=1)
+    return np.divide(areas, wanted, out=np.full(len(areas), np.nan), where=wanted > 0)
 
 
 def too_few_runs(count: int) -> str:
@@ -238,12 +240,12 @@ def balanced_score(evaluation: Evaluation) -> float:
 
     Choose it on validation frames when false positives are compared at a fixed score.
     """
-    curve = precision_recall(evaluation)
-    if not curve.recall.any():
+    score, precision, recall = precision_recall(evaluation)
+    if not recall.any():
         return 0.0
-    both = curve.precision + curve.recall
-    balance = np.divide(curve.precision * curve.recall, both, out=np.zeros_like(both), where=both > 0)
-    return float(curve.score[balance.argmax()])
+    both = precision + recall
+    balance = np.divide(precision * recall, both, out=np.zeros_like(both), where=both > 0)
+    return float(score[balance.argmax()])
 
 
 def part(evaluation: Evaluation, detections: Boolean, wanted: Boolean) -> Evaluation:
@@ -294,37 +296,6 @@ def _evaluated(frames: Sequence[FrameResult], matches: Sequence[Match]) -> Evalu
 
 def _rows(table: Table, rows: Boolean | Integer) -> Table:
     return replace(table, **{column.name: getattr(table, column.name)[rows] for column in fields(table)})
-
-
-def _areas(evaluation: Evaluation, times: Float, group: Integer, wanted: Float | Integer) -> Float:
-    """Return average precisions where groups of detections come several times or not at all.
-
-    Precision falls from one hit to the next, so that only scores with a hit can hold the best precision at a recall or
-    beyond; the others, which are most, are left out.
-
-    Parameters
-    ----------
-    times : (b, g) float64
-        How often each group is there.
-    group : (d,) int64
-        Group of each detection.
-    wanted : (b,) array
-        The number of road users that count.
-    """
-    detections = evaluation.detections
-    # Detections are sorted by score, so the first k of them are those above a threshold, and cumulative sums give hits
-    # and detections at all thresholds. Runs may come several times without matching again: matches are within frames.
-    last = _last_of_equals(detections.score)
-    last = last[np.diff(np.cumsum(detections.hit)[last], prepend=0) > 0]
-    belongs = np.arange(times.shape[1])[:, None] == group
-    hits = times @ np.cumsum(belongs & detections.hit, axis=1)[:, last].astype(np.float64)
-    found = times @ np.cumsum(belongs, axis=1)[:, last].astype(np.float64)
-    precision = np.divide(hits, found, out=np.zeros(hits.shape), where=found > 0)
-    # All-point interpolation: the best precision at this or a larger recall. The area is then a sum over steps of
-    # recall, which is hits over the number of road users; the sum is over steps of hits, and divided at the end.
-    best_from_here = np.maximum.accumulate(precision[:, ::-1], axis=1)[:, ::-1]
-    areas = (np.diff(hits, axis=1, prepend=0) * best_from_here).sum(axis=1)
-    return np.divide(areas, wanted, out=np.full(len(areas), np.nan), where=wanted > 0)
 
 
 def _last_of_equals(score: Float) -> Integer:

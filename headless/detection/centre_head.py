@@ -22,7 +22,7 @@ from torch.nn import functional
 
 from .network import OUTPUT_STRIDE, convolution
 from .pillars import PillarGrid
-from .rotated_boxes import in_plan, paired_iou
+from .rotated_boxes import paired_iou
 from .settings import CLASSES
 
 # Channels of a box, after those of the heat maps.
@@ -83,22 +83,6 @@ class TrainingTargets:
     learnable: Tensor
 
 
-@dataclass(frozen=True, eq=False)
-class BoxProposals:
-    """Boxes of one cloud before those that overlap better ones are removed; k boxes.
-
-    Parameters
-    ----------
-    boxes : (k, 7) float32 Tensor
-    score : (k,) float32 Tensor
-    category : (k,) int64 Tensor
-    """
-
-    boxes: Tensor
-    score: Tensor
-    category: Tensor
-
-
 class CentreHead(nn.Module):
     """Heat maps and boxes from a feature map.
 
@@ -151,7 +135,7 @@ class CentreHead(nn.Module):
         # Cells near road users with too few points take no part: a detection there should be neither rewarded nor
         # punished. Cells near the window's border do not either, as they see only parts of road users.
         ignored = torch.stack([heat_of(wanted.boxes[~wanted.learnable], grid, device)[0] for wanted in targets])
-        counted = (ignored < MIN_HEAT) & _inner_cells(grid, OUTPUT_STRIDE, margin, device)
+        counted = (ignored < MIN_HEAT) & _inner_cells(grid, margin, device)
         cell = torch.stack(torch.nonzero((owner >= 0) & counted, as_tuple=True))
         cloud, row, column = cell
         return {
@@ -178,24 +162,32 @@ class CentreHead(nn.Module):
         reference = reference_points(grid, row, column)
         return {"heat": heat_loss, **box_losses(predicted, maps["box"], reference, maps["weight"])}
 
-    def candidates(self, output: Tensor, grid: PillarGrid, least_score: float) -> list[BoxProposals]:
-        """Return a box for each peak of heat in each cloud whose heat is not below ``least_score``."""
+    def candidates(self, output: Tensor, grid: PillarGrid, least_score: float) -> tuple[Tensor, Tensor, Tensor]:
+        """Return a box for each peak of heat in one cloud whose heat is not below ``least_score``; they may overlap.
+
+        Parameters
+        ----------
+        output : (1, channels, rows, columns) Tensor
+            What the head returns.
+
+        Returns
+        -------
+        boxes : (k, 7) float32 Tensor
+        score : (k,) float32 Tensor
+        category : (k,) int64 Tensor
+        """
         heat = torch.sigmoid(output[:, : len(CLASSES)])
         # A cell is a peak if it equals the maximum of its 3 × 3 neighbourhood. This removes most of the many boxes of
         # one road user before suppression, which is quadratic in their number.
-        heat = heat * (heat == functional.max_pool2d(heat, 3, 1, 1))
-        found = []
-        for cloud, values in enumerate(heat):
-            category, row, column = torch.nonzero(values >= least_score, as_tuple=True)
-            best = torch.sort(values[category, row, column], descending=True, stable=True).indices[:MAX_PEAKS]
-            category, row, column = category[best], row[best], column[best]
-            predicted = output[cloud, len(CLASSES) :, row, column].T
-            boxes = _boxes(predicted, reference_points(grid, row, column))
-            overlap = torch.sigmoid(predicted[:, OVERLAP])
-            # Geometric mean: heat tells whether there is a road user, the predicted IoU how well this box fits it.
-            score = values[category, row, column].pow(1 - OVERLAP_POWER) * overlap.pow(OVERLAP_POWER)
-            found.append(BoxProposals(boxes, score, category))
-        return found
+        heat = (heat * (heat == functional.max_pool2d(heat, 3, 1, 1)))[0]
+        category, row, column = torch.nonzero(heat >= least_score, as_tuple=True)
+        best = torch.sort(heat[category, row, column], descending=True, stable=True).indices[:MAX_PEAKS]
+        category, row, column = category[best], row[best], column[best]
+        predicted = output[0, len(CLASSES) :, row, column].T
+        overlap = torch.sigmoid(predicted[:, OVERLAP])
+        # Geometric mean: heat tells whether there is a road user, the predicted IoU how well this box fits it.
+        score = heat[category, row, column].pow(1 - OVERLAP_POWER) * overlap.pow(OVERLAP_POWER)
+        return _boxes(predicted, reference_points(grid, row, column)), score, category
 
 
 def _branch(channels: int, width: int, outputs: int, bias: float) -> nn.Sequential:
@@ -214,7 +206,7 @@ def box_losses(predicted: Tensor, target: Tensor, reference: Tensor, weight: Ten
     # The IoU of the current boxes is the target of the overlap channel. Without no_grad its gradient would flow into
     # the boxes, and they could lower this loss by becoming worse.
     with torch.no_grad():
-        true_overlap = paired_iou(in_plan(_boxes(predicted, reference)), in_plan(target)).to(predicted.dtype)
+        true_overlap = paired_iou(_boxes(predicted, reference), target).to(predicted.dtype)
     overlap = functional.binary_cross_entropy_with_logits(predicted[:, OVERLAP], true_overlap, reduction="none")
     return {
         "offset": 2.0 * weighted_mean((predicted[:, OFFSET] - (target[:, :3] - reference)).abs().sum(1), weight),
@@ -239,7 +231,7 @@ def _boxes(predicted: Tensor, reference: Tensor) -> Tensor:
 
 def reference_points(grid: PillarGrid, row: Tensor, column: Tensor) -> Tensor:
     """Return the points (m, 3) from which offsets are regressed: the cells' centres, at the bottom of the grid."""
-    x, y = _cell_centres(grid, OUTPUT_STRIDE, row.device)
+    x, y = _cell_centres(grid, row.device)
     return torch.stack((x[column], y[row], torch.full_like(x[column], grid.bottom)), dim=1)
 
 
@@ -259,7 +251,7 @@ def _target_maps(wanted: TrainingTargets, grid: PillarGrid, device: torch.device
 
 def heat_of(boxes: Tensor, grid: PillarGrid, device: torch.device) -> tuple[Tensor, Tensor]:
     """Return the greatest heat in each cell (rows, columns), 1 where a box has its centre, and that box's index."""
-    x, y = _cell_centres(grid, OUTPUT_STRIDE, device)
+    x, y = _cell_centres(grid, device)
     if len(boxes) == 0:
         nothing = torch.zeros((len(y), len(x)), device=device)
         return nothing, nothing.long()
@@ -285,17 +277,17 @@ def _matched_boxes(targets: list[TrainingTargets], cloud: Tensor, index: Tensor)
     return torch.cat([part.boxes for part in targets])[first[cloud] + index]
 
 
-def _cell_centres(grid: PillarGrid, stride: int, device: torch.device) -> tuple[Tensor, Tensor]:
+def _cell_centres(grid: PillarGrid, device: torch.device) -> tuple[Tensor, Tensor]:
     """Return x (columns,) and y (rows,) of the centres of the cells of a feature map, metres."""
-    side = grid.pillar * stride
-    x = grid.west + side * (torch.arange(grid.columns // stride, device=device) + 0.5)
-    y = grid.south + side * (torch.arange(grid.rows // stride, device=device) + 0.5)
+    side = grid.pillar * OUTPUT_STRIDE
+    x = grid.west + side * (torch.arange(grid.columns // OUTPUT_STRIDE, device=device) + 0.5)
+    y = grid.south + side * (torch.arange(grid.rows // OUTPUT_STRIDE, device=device) + 0.5)
     return x, y
 
 
-def _inner_cells(grid: PillarGrid, stride: int, margin: float, device: torch.device) -> Tensor:
+def _inner_cells(grid: PillarGrid, margin: float, device: torch.device) -> Tensor:
     """Return which cells (rows, columns) of a feature map are ``margin`` or more from the border."""
-    x, y = _cell_centres(grid, stride, device)
+    x, y = _cell_centres(grid, device)
     wide, deep = grid.columns * grid.pillar, grid.rows * grid.pillar
     across = (x - grid.west >= margin) & (x - grid.west <= wide - margin)
     along = (y - grid.south >= margin) & (y - grid.south <= deep - margin)

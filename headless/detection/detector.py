@@ -131,10 +131,10 @@ class Detector(nn.Module):
 
     def description(self) -> dict[str, Any]:
         """Return the settings and the training record as plain values."""
-        return {
-            "settings": _plain(asdict(self.settings)),
-            "experience": _plain(asdict(self.training_record)),
-        }
+        found: dict[str, Any] = _interned(
+            {"settings": asdict(self.settings), "experience": asdict(self.training_record)}
+        )
+        return found
 
     @classmethod
     def load(cls, path: str | os.PathLike[str], device: str = "cpu") -> Detector:
@@ -148,8 +148,7 @@ class Detector(nn.Module):
         state = load_state(path)
         with reading_detector(path):
             known = dict(state["settings"])
-            if known.pop("head", "centre") != "centre":  # files of earlier versions name one of two heads
-                raise SeipError("it has anchors, which are no longer supported")
+            known.pop("head", None)  # files of earlier versions name one of two heads
             settings = NetworkSettings(**{**known, "blocks": tuple(known["blocks"])})
             experience = {name: tuple(names) for name, names in state["experience"].items()}
             detector = cls(settings, training_record=TrainingRecord(**experience))
@@ -261,7 +260,3 @@ def _interned(value: Any) -> Any:  # noqa: ANN401  # plain values of any kind
     if isinstance(value, list | tuple):
         return [_interned(part) for part in value]
     return value
-
-
-def _plain(values: dict[str, Any]) -> dict[str, Any]:
-    return {name: list(value) if isinstance(value, tuple) else value for name, value in values.items()}

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
 from seip_addon.core.base.arrays import Boolean, Float, Integer, Text
+from seip_addon.core.sensing.recordings.recorded_frames import within_box
 from seip_addon.core.sensing.scans.frame import Frame
 
 from .settings import CLASS_CATEGORIES
@@ -197,9 +198,5 @@ def _returns_around(boxes: Float, points: NDArray[np.float32]) -> tuple[Integer,
         strip = points[first[row] : end[row]]
         here = strip[np.abs(strip[:, 1] - y) <= reach[row]] - (x, y, z)
         near[row] = np.count_nonzero(here[:, 0] ** 2 + here[:, 1] ** 2 <= DENSITY_RADIUS**2)
-        # along the axes of the box, where it is an interval in each
-        ahead = np.cos(yaw) * here[:, 0] + np.sin(yaw) * here[:, 1]
-        aside = np.cos(yaw) * here[:, 1] - np.sin(yaw) * here[:, 0]
-        within = (np.abs(ahead) <= length / 2) & (np.abs(aside) <= width / 2) & (np.abs(here[:, 2]) <= height / 2)
-        inside[row] = np.count_nonzero(within)
+        inside[row] = np.count_nonzero(within_box(here, (length, width, height), yaw))
     return inside, near / (np.pi * DENSITY_RADIUS**2)

@@ -28,8 +28,10 @@ class Recording:
         For messages.
     traffic : str
         Identifier of the run of traffic: the source of its trajectories, with its seed.
-    frames : sequence of Frame
-        Frames in memory, or simulated on access.
+    count : int
+        Number of frames.
+    load : callable
+        From a frame's number to the frame, which may be simulated then.
     sensors : tuple of str
         Catalogue keys of the sensors' types, where they are known.
     site : str
@@ -40,29 +42,11 @@ class Recording:
 
     name: str
     traffic: str
-    frames: Sequence[Frame]
+    count: int
+    load: Callable[[int], Frame]
     sensors: tuple[str, ...] = ()
     site: str = ""
     placement: str = ""
-
-
-class LazyFrames(Sequence[Frame]):
-    """Frames that are simulated on each access.
-
-    Parameters
-    ----------
-    load : callable
-        From a frame's number to the frame.
-    """
-
-    def __init__(self, count: int, load: Callable[[int], Frame]) -> None:
-        self._numbers, self._load = range(count), load
-
-    def __len__(self) -> int:
-        return len(self._numbers)
-
-    def __getitem__(self, index: int) -> Frame:  # type: ignore[override]  # nobody takes slices
-        return self._load(self._numbers[index])
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,11 +102,11 @@ class SampledRecording:
         self.get = functools.cache(self._sample)
 
     def __len__(self) -> int:
-        return len(self.recording.frames)
+        return self.recording.count
 
     def _sample(self, frame: int) -> TrainingSample:
         """Return the sample of a frame."""
-        return sample_of(self.recording.frames[frame], self.area, self.most_points)
+        return sample_of(self.recording.load(frame), self.area, self.most_points)
 
 
 def drawn(recordings: Sequence[SampledRecording], random: np.random.Generator) -> TrainingSample:

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from seip_addon.core.base.arrays import Boolean, Float, Integer
 
 from .frame_results import FrameResult
-from .rotated_boxes import in_plan, iou_matrix, iou_matrix_3d
+from .rotated_boxes import iou_matrix
 
 VEHICLES = ("car", "van", "truck", "bus")  # categories whose average precision the study compares
 NO_MATCH = -1  # in place of the index of a detection or a road user
@@ -125,6 +125,5 @@ def counted_road_users(frame: FrameResult, rule: Rule) -> Boolean:
 
 def overlaps(boxes: Float, others: Float, *, in_space: bool = False) -> Float:
     """Return the intersection over union of boxes (k, 7) with others (g, 7), in plan or in space, (k, g)."""
-    one, other = torch.from_numpy(boxes), torch.from_numpy(others)
-    iou = iou_matrix_3d(one, other) if in_space else iou_matrix(in_plan(one), in_plan(other))
+    iou = iou_matrix(torch.from_numpy(boxes), torch.from_numpy(others), in_space=in_space)
     return np.asarray(iou.numpy(), dtype=np.float64)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -65,11 +65,6 @@ class PillarGrid:
     def centre(self) -> tuple[float, float]:
         """Middle of the rectangle, metres."""
         return (self.west + self.east) / 2, (self.south + self.north) / 2
-
-    def window(self, x: float, y: float, pillars: int) -> PillarGrid:
-        """Return a square grid of ``pillars`` pillars centred at a point, which may extend beyond this grid."""
-        half = pillars * self.pillar / 2
-        return replace(self, west=x - half, south=y - half, columns=pillars, rows=pillars)
 
     def holds(self, xyz: NDArray[np.float32] | Float) -> Boolean:
         """Return which points (n, 3) lie in the grid, between bottom and top."""

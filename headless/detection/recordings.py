@@ -20,7 +20,7 @@ from seip_addon.core.sensing.scans.run_folder import Run
 from seip_addon.core.sensing.scans.sensor import MountedSensor
 from seip_addon.core.sensing.scans.simulation import ScanSettings, Simulation, prepare
 from seip_addon.core.sensing.scans.static_scene import static_scene
-from seip_addon.core.sensing.traffic.bodies import fitted_body
+from seip_addon.core.sensing.traffic.bodies import Body, fitted_body
 from seip_addon.core.sensing.traffic.trajectories import WARM_UP, Trajectories, parked_users
 from seip_addon.core.site.scene_geometry import SceneGeometry
 from seip_addon.core.storage.files import digest
@@ -48,6 +48,11 @@ class SampledRun:
     def parked(self) -> Boolean:
         """Mask of the u road users that do not move during the run, (u,) bool."""
         return parked_users(self.trajectories)
+
+    @functools.cached_property
+    def bodies(self) -> tuple[Body, ...]:
+        """Body of each road user."""
+        return tuple(fitted_body(user) for user in self.trajectories.users)
 
     @property
     def key(self) -> str:
@@ -136,8 +141,7 @@ class Simulator:
         return self._simulation(configuration, run).frame(number, float(run.times[number]))
 
     def _prepared(self, configuration: MountedSensors, run: SampledRun) -> Simulation:
-        bodies = [fitted_body(user) for user in run.trajectories.users]
-        return finish(prepare(self.static, configuration.sensors, run.trajectories, bodies, self.settings))
+        return finish(prepare(self.static, configuration.sensors, run.trajectories, run.bodies, self.settings))
 
 
 def poses_key(configuration: MountedSensors) -> str:
@@ -153,7 +157,7 @@ def frames_key(simulator: Simulator, configuration: MountedSensors, runs: Sequen
             origin=run.trajectories.origin,
             sensors=configuration.sensors,
             trajectories=run.trajectories,
-            bodies=[fitted_body(user) for user in run.trajectories.users],
+            bodies=run.bodies,
             times=run.times,
             settings=simulator.settings,
             versions=versions(),

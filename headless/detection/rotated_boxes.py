@@ -14,26 +14,8 @@ CORNERS = ((0.5, 0.5), (-0.5, 0.5), (-0.5, -0.5), (0.5, -0.5))  # of a unit squa
 PAIRS_AT_ONCE = 2000  # pairs that stay in a core's cache; in threads, small steps like these take ten times as long
 
 
-def paired_iou(a: Tensor, b: Tensor) -> Tensor:
-    """Return the intersection over union in plan of each pair of boxes.
-
-    Parameters
-    ----------
-    a, b : (n, 5) Tensor
-        x, y of the middle, length, width (metres), yaw (radians, counter-clockwise).
-
-    Returns
-    -------
-    (n,) float64 Tensor
-        Zero for two boxes without area.
-    """
-    a, b = a.double(), b.double()
-    shared = _overlap(a, b)
-    return _ratio(shared, a[:, 2] * a[:, 3] + b[:, 2] * b[:, 3] - shared)
-
-
-def paired_iou_3d(a: Tensor, b: Tensor) -> Tensor:
-    """Return the intersection over union in space of each pair of upright boxes.
+def paired_iou(a: Tensor, b: Tensor, *, in_space: bool = False) -> Tensor:
+    """Return the intersection over union of each pair of upright boxes, in plan or in space.
 
     Parameters
     ----------
@@ -43,30 +25,29 @@ def paired_iou_3d(a: Tensor, b: Tensor) -> Tensor:
     Returns
     -------
     (n,) float64 Tensor
-        Zero for two boxes without volume.
+        Zero for two boxes without area, or without volume.
     """
     a, b = a.double(), b.double()
-    top = torch.minimum(a[:, 2] + a[:, 5] / 2, b[:, 2] + b[:, 5] / 2)
-    bottom = torch.maximum(a[:, 2] - a[:, 5] / 2, b[:, 2] - b[:, 5] / 2)
-    shared = _overlap(in_plan(a), in_plan(b)) * (top - bottom).clamp(min=0)
-    return _ratio(shared, a[:, 3:6].prod(dim=1) + b[:, 3:6].prod(dim=1) - shared)
+    parts = zip(torch.split(a, PAIRS_AT_ONCE), torch.split(b, PAIRS_AT_ONCE), strict=True)
+    shared, size = torch.cat([_overlap(*part) for part in parts]), slice(3, 5)
+    if in_space:
+        top = torch.minimum(a[:, 2] + a[:, 5] / 2, b[:, 2] + b[:, 5] / 2)
+        bottom = torch.maximum(a[:, 2] - a[:, 5] / 2, b[:, 2] - b[:, 5] / 2)
+        shared, size = shared * (top - bottom).clamp(min=0), slice(3, 6)
+    whole = a[:, size].prod(dim=1) + b[:, size].prod(dim=1) - shared
+    return torch.where(whole > 0, shared / torch.where(whole > 0, whole, 1.0), 0.0)
 
 
-def iou_matrix(a: Tensor, b: Tensor) -> Tensor:
-    """Return the (n, m) intersections over union in plan of (n, 5) and (m, 5) boxes."""
-    i, j = _near(a.double(), b.double())
-    return _scattered(paired_iou(a[i], b[j]), i, j, (len(a), len(b)))
-
-
-def iou_matrix_3d(a: Tensor, b: Tensor) -> Tensor:
-    """Return the (n, m) intersections over union in space of (n, 7) and (m, 7) boxes."""
-    i, j = _near(in_plan(a.double()), in_plan(b.double()))
-    return _scattered(paired_iou_3d(a[i], b[j]), i, j, (len(a), len(b)))
-
-
-def in_plan(boxes: Tensor) -> Tensor:
-    """Return boxes (n, 7) seen from above, (n, 5)."""
-    return boxes[:, [0, 1, 3, 4, 6]]
+def iou_matrix(a: Tensor, b: Tensor, *, in_space: bool = False) -> Tensor:
+    """Return the (n, m) intersections over union of (n, 7) and (m, 7) boxes; see `paired_iou`."""
+    a, b = a.double(), b.double()
+    # only boxes whose circles about the corners meet can overlap
+    reach = torch.hypot(a[:, 3], a[:, 4])[:, None] + torch.hypot(b[:, 3], b[:, 4])
+    apart = torch.hypot(a[:, None, 0] - b[:, 0], a[:, None, 1] - b[:, 1])
+    i, j = torch.nonzero(2 * apart < reach, as_tuple=True)
+    matrix = a.new_zeros((len(a), len(b)))
+    matrix[i, j] = paired_iou(a[i], b[j], in_space=in_space)
+    return matrix
 
 
 def suppress(boxes: Tensor, scores: Tensor, threshold: float) -> Tensor:
@@ -74,8 +55,8 @@ def suppress(boxes: Tensor, scores: Tensor, threshold: float) -> Tensor:
 
     Parameters
     ----------
-    boxes : (n, 5) Tensor
-        As in `paired_iou`.
+    boxes : (n, 7) Tensor
+        As in `paired_iou`; their overlap in plan counts.
     scores : (n,) Tensor
         Among equal scores the earlier box has priority.
     threshold : float
@@ -99,14 +80,9 @@ def suppress(boxes: Tensor, scores: Tensor, threshold: float) -> Tensor:
 
 def _overlap(a: Tensor, b: Tensor) -> Tensor:
     """Return the area in plan that each pair shares."""
-    parts = zip(torch.split(a, PAIRS_AT_ONCE), torch.split(b, PAIRS_AT_ONCE), strict=True)
-    return torch.cat([_few_overlaps(*part) for part in parts])
-
-
-def _few_overlaps(a: Tensor, b: Tensor) -> Tensor:
     # Clamping x and y moves a point to the nearest point of the rectangle of b. Parts of the outline of a outside of it
     # move onto its border, where they run back and forth or around it, so that the enclosed area is the overlap.
-    half_length, half_width = b[:, 2] / 2, b[:, 3] / 2
+    half_length, half_width = b[:, 3] / 2, b[:, 4] / 2
     x, y = _corners_seen_from(a, b)
     dx, dy = x.roll(-1, dims=0) - x, y.roll(-1, dims=0) - y
     # Along an edge the moved outline changes its y between two cuts alone, and bends in x at two more in between:
@@ -129,9 +105,9 @@ def _cuts(start: Tensor, step: Tensor, half: Tensor) -> tuple[Tensor, Tensor]:
 
 def _corners_seen_from(a: Tensor, b: Tensor) -> tuple[Tensor, Tensor]:
     """Return x and y (4, n) of the corners of `a` in the frames of `b`."""
-    east, north = _rotated(a[:, 0] - b[:, 0], a[:, 1] - b[:, 1], -b[:, 4])
+    east, north = _rotated(a[:, 0] - b[:, 0], a[:, 1] - b[:, 1], -b[:, 6])
     unit = torch.tensor(CORNERS, dtype=a.dtype, device=a.device)
-    x, y = _rotated(unit[:, :1] * a[:, 2], unit[:, 1:] * a[:, 3], a[:, 4] - b[:, 4])
+    x, y = _rotated(unit[:, :1] * a[:, 3], unit[:, 1:] * a[:, 4], a[:, 6] - b[:, 6])
     return x + east, y + north
 
 
@@ -139,21 +115,3 @@ def _rotated(x: Tensor, y: Tensor, angle: Tensor) -> tuple[Tensor, Tensor]:
     """Turn points counter-clockwise about the origin."""
     cosine, sine = torch.cos(angle), torch.sin(angle)
     return cosine * x - sine * y, sine * x + cosine * y
-
-
-def _near(a: Tensor, b: Tensor) -> tuple[Tensor, Tensor]:
-    """Return the pairs whose circles about the corners meet; no others can overlap."""
-    reach = torch.hypot(a[:, 2], a[:, 3])[:, None] + torch.hypot(b[:, 2], b[:, 3])
-    apart = torch.hypot(a[:, None, 0] - b[:, 0], a[:, None, 1] - b[:, 1])
-    i, j = torch.nonzero(2 * apart < reach, as_tuple=True)
-    return i, j
-
-
-def _scattered(values: Tensor, i: Tensor, j: Tensor, shape: tuple[int, int]) -> Tensor:
-    matrix = values.new_zeros(shape)
-    matrix[i, j] = values
-    return matrix
-
-
-def _ratio(shared: Tensor, whole: Tensor) -> Tensor:
-    return torch.where(whole > 0, shared / torch.where(whole > 0, whole, 1.0), 0.0)

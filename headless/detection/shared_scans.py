@@ -14,7 +14,6 @@ from seip_addon.core.sensing.scans.frame import Frame
 from seip_addon.core.sensing.scans.scanner import Scanner
 from seip_addon.core.sensing.scans.sensor import MountedSensor
 from seip_addon.core.sensing.scans.simulation import Simulation, body_surfaces, prepare
-from seip_addon.core.sensing.traffic.bodies import Body, fitted_body
 from seip_addon.core.storage.array_file import ArrayFile
 from seip_addon.core.storage.files import digest
 from seip_addon.core.storage.source_digest import source_digest
@@ -70,9 +69,8 @@ class SharedScans:
     def cast(self, run: SampledRun) -> Generator[Progress, None, None]:
         """Cast the rays at the static scene, before frames of any run are made."""
         if not self._scanners:
-            first = yield from prepare(
-                self.simulator.static, self._sensors, run.trajectories, _bodies(run), self.simulator.settings
-            )
+            static, settings = self.simulator.static, self.simulator.settings
+            first = yield from prepare(static, self._sensors, run.trajectories, run.bodies, settings)
             self._scanners = list(first.scanners)
 
     def frames(self, run: SampledRun, numbers: Sequence[int], placements: Sequence[int]) -> Iterator[tuple[int, Frame]]:
@@ -85,21 +83,19 @@ class SharedScans:
         placements : sequence of int
             Numbers of the placements.
         """
+        static, settings = self.simulator.static, self.simulator.settings
+        shapes = body_surfaces(run.bodies, settings.engine)
+
+        def simulation(poses: Sequence[int]) -> Simulation:
+            return Simulation(static, [self._scanners[pose] for pose in poses], run.trajectories, shapes, settings)
+
         used = sorted({pose for placement in placements for pose in self._parts[placement]})
-        simulation = self._simulation(run, used)
-        own = {placement: [used.index(pose) for pose in self._parts[placement]] for placement in placements}
-        parts = {placement: simulation.part(poses) for placement, poses in own.items()}
+        whole, parts = simulation(used), {placement: simulation(self._parts[placement]) for placement in placements}
         for number in numbers:
             snapshot = run.trajectories.at(float(run.times[number]))
-            scans = simulation.scans(snapshot)
+            scans = dict(zip(used, whole.scans(snapshot), strict=True))
             for placement, part in parts.items():
-                yield placement, part.measure(number, snapshot, [scans[pose] for pose in own[placement]])
-
-    def _simulation(self, run: SampledRun, poses: Sequence[int]) -> Simulation:
-        simulator = self.simulator
-        scanners = [self._scanners[pose] for pose in poses]
-        shapes = body_surfaces(_bodies(run), simulator.settings.engine)
-        return Simulation(simulator.static, scanners, run.trajectories, shapes, simulator.settings)
+                yield placement, part.measure(number, snapshot, [scans[pose] for pose in self._parts[placement]])
 
 
 def detect_with_all(
@@ -157,33 +153,25 @@ def _detect_in_run(
     total = len(numbers) * len(files)
     for done, (placement, frame) in enumerate(shared.frames(run, numbers, list(files))):
         yield Progress(done, total, f"detect in {run.name}")
-        found[placement].append(_detected(shared, shared.placements[placement], run, frame, detector))
+        boxes = detect(detector, shared.simulator.area(detector.settings.pillar), frame)
+        found[placement].append(
+            frame_result(
+                some_points(frame, frame.foreground),
+                boxes,
+                region=shared.simulator.static.region,
+                sensors=shared.placements[placement].positions,
+                run=run.name,
+                parked=run.parked,
+            )
+        )
     for placement, path in files.items():
         save_frames(path, found[placement])
     yield Progress(total, total, f"detect in {run.name}")
 
 
-def _detected(
-    shared: SharedScans, placement: MountedSensors, run: SampledRun, frame: Frame, detector: Detector
-) -> FrameResult:
-    found = detect(detector, shared.simulator.area(detector.settings.pillar), frame)
-    return frame_result(
-        some_points(frame, frame.foreground),
-        found,
-        region=shared.simulator.static.region,
-        sensors=placement.positions,
-        run=run.name,
-        parked=run.parked,
-    )
-
-
 def some_points(frame: Frame, kept: Boolean) -> Frame:
     """Return the frame with the points of a mask (n,); the counts in its labels are those of all points."""
     return replace(frame, **{name: getattr(frame, name)[kept] for name in POINT_FIELDS})
-
-
-def _bodies(run: SampledRun) -> list[Body]:
-    return [fitted_body(user) for user in run.trajectories.users]
 
 
 def _key(sensor: MountedSensor) -> tuple[object, ...]:

@@ -21,6 +21,7 @@ from torch.utils.data import DataLoader, Dataset
 
 from seip_addon.core.base.errors import SeipError
 from seip_addon.core.base.progress import Progress
+from seip_addon.core.storage.files import digest
 from seip_addon.core.storage.source_digest import source_digest
 
 from .average_precision import evaluate
@@ -63,20 +64,6 @@ class LearningCurve:
         return max(self.validation, key=lambda step: (self.validation[step], -step))
 
 
-@dataclass(frozen=True, eq=False)
-class TrainedDetector:
-    """A detector and how it came about.
-
-    Parameters
-    ----------
-    detector : Detector
-        As it was when it did best on the frames set aside.
-    """
-
-    detector: Detector
-    curve: LearningCurve
-
-
 def train(  # noqa: PLR0913  # data, settings, device and initial weights
     recordings: Sequence[SampledRecording],
     validation: Sequence[SampledRecording],
@@ -86,7 +73,7 @@ def train(  # noqa: PLR0913  # data, settings, device and initial weights
     device: str = "cpu",
     store: str | os.PathLike[str] | None = None,
     start: Detector | None = None,
-) -> Generator[Progress, None, TrainedDetector]:
+) -> Generator[Progress, None, tuple[Detector, LearningCurve]]:
     """Train a PointPillars detector until its precision on recordings set aside stops growing.
 
     Parameters
@@ -107,8 +94,11 @@ def train(  # noqa: PLR0913  # data, settings, device and initial weights
 
     Returns
     -------
-    TrainedDetector
-        The same bytes for the same arguments, on one kind of processor; not on a GPU.
+    detector : Detector
+        Detector as it was when it did best on the frames set aside: the same bytes for the same arguments, on one kind
+        of processor; not on a GPU.
+    curve : LearningCurve
+        Loss and precision by step.
 
     Raises
     ------
@@ -134,8 +124,11 @@ def train(  # noqa: PLR0913  # data, settings, device and initial weights
     return run.result()
 
 
-class _Run:
-    """State of a running training."""
+_Batch = tuple[Pillars, dict[str, Tensor]]  # pillars of the windows of a step, and their training targets
+
+
+class _Run(Dataset[_Batch]):
+    """State of a running training, and its batches by the number of their step."""
 
     def __init__(
         self,
@@ -152,7 +145,13 @@ class _Run:
         if start is not None:
             training_record = training_record.merged_with(start.training_record)
         self.detector = Detector(network, settings.seed, training_record).to(device)
-        self.start = "" if start is None else start.key
+        sources = [(one.recording, len(one)) for one in (*self.training_set, *self.aside)]
+        self.key = digest(
+            source_digest("headless.detection"),
+            repr((self.detector.description(), settings)),
+            "" if start is None else start.key,
+            repr([(one.name, one.traffic, one.placement, count) for one, count in sources]),
+        )
         if start is not None:
             self.detector.load_state_dict(start.state_dict())
         self.optimiser = torch.optim.AdamW(
@@ -173,12 +172,26 @@ class _Run:
         waited = sum(step > self.curve.best for step in self.curve.validation)
         return self.step >= self.settings.steps or waited >= self.settings.patience
 
+    def __len__(self) -> int:
+        return self.settings.steps
+
+    def __getitem__(self, step: int) -> _Batch:
+        # A generator for each step, not one for the training: a resumed training draws the same samples as one that was
+        # not interrupted, without storing the generator's state, and so do processes that make batches side by side.
+        settings, random = self.settings, np.random.default_rng([self.settings.seed, 1, step])
+        samples = [drawn(self.training_set, random) for _ in range(settings.batch)]
+        varied = [vary(sample, self.window, random, settings.least_points) for sample in samples]
+        most = self.detector.settings.most_points
+        pillars = stacked([fill_pillars(one.points, self.window, most) for one in varied], self.window)
+        targets = [_targets(one, settings.least_points) for one in varied]
+        return pillars, self.detector.head.target_maps(targets, self.window, LOSS_MARGIN)
+
     def batches(self) -> Iterator[_Batch]:
         """Return the batches of the remaining steps; other processes make them ahead for a GPU."""
         # Forked processes share the samples, which others would copy; Windows has none.
         forks = self.detector.device.type == "cuda" and "fork" in multiprocessing.get_all_start_methods()
         loader: DataLoader[_Batch] = DataLoader(
-            _Batches(self),
+            self,
             batch_size=None,
             sampler=range(self.step, self.settings.steps),
             num_workers=max(1, (os.cpu_count() or 1) - 1) if forks else 0,
@@ -222,10 +235,10 @@ class _Run:
             what += f", validation AP {100 * next(reversed(self.curve.validation.values())):.1f} %"
         return Progress(self.step, self.settings.steps, what)
 
-    def result(self) -> TrainedDetector:
+    def result(self) -> tuple[Detector, LearningCurve]:
         """Return the best detector so far."""
         self.detector.load_state_dict(self.best)
-        return TrainedDetector(self.detector.eval(), self.curve)
+        return self.detector.eval(), self.curve
 
     def store(self, path: str | os.PathLike[str]) -> None:
         """Write all that is needed to go on, and the best weights so far as those of a detector."""
@@ -237,10 +250,7 @@ class _Run:
                 **self.detector.description(),
                 "weights": _copied(self.best),
                 "training": {
-                    "settings": asdict(self.settings),
-                    "recordings": self._sources(),
-                    "start": self.start,
-                    "program": source_digest("headless.detection"),
+                    "key": self.key,
                     "step": self.step,
                     "curve": asdict(self.curve),
                     "weights": _copied(self.detector.state_dict()),
@@ -254,15 +264,7 @@ class _Run:
         """Continue from a stored training."""
         state = load_state(path)
         earlier = state.get("training", {})
-        same = (
-            all(state.get(name) == self.detector.description()[name] for name in ("settings", "experience"))
-            and isinstance(earlier, dict)
-            and earlier.get("settings") == asdict(self.settings)
-            and earlier.get("recordings") == self._sources()
-            and earlier.get("start") == self.start
-            and earlier.get("program") == source_digest("headless.detection")
-        )
-        if not same:
+        if not isinstance(earlier, dict) or earlier.get("key") != self.key:
             raise SeipError(
                 f"{path} is of a training with other settings or recordings, or of another version of the program: "
                 "delete it, or choose another file"
@@ -274,36 +276,6 @@ class _Run:
             self.detector.load_state_dict(earlier["weights"])
             self.optimiser.load_state_dict(earlier["optimiser"])
             self.schedule.load_state_dict(earlier["schedule"])
-
-    def _sources(self) -> list[list[str | int]]:
-        both = (*self.training_set, *self.aside)
-        recordings = [(sampled.recording, len(sampled)) for sampled in both]
-        return [[one.name, one.traffic, one.placement, count] for one, count in recordings]
-
-
-_Batch = tuple[Pillars, dict[str, Tensor]]  # pillars of the windows of a step, and their training targets
-
-
-class _Batches(Dataset[_Batch]):
-    """Batches of a training by the number of their step."""
-
-    def __init__(self, run: _Run) -> None:
-        self._recordings, self._settings, self._grid = run.training_set, run.settings, run.window
-        self._most_points = run.detector.settings.most_points
-        self._target_maps = run.detector.head.target_maps
-
-    def __len__(self) -> int:
-        return self._settings.steps
-
-    def __getitem__(self, step: int) -> _Batch:
-        # A generator for each step, not one for the training: a resumed training draws the same samples as one that was
-        # not interrupted, without storing the generator's state, and so do processes that make batches side by side.
-        random = np.random.default_rng([self._settings.seed, 1, step])
-        samples = [drawn(self._recordings, random) for _ in range(self._settings.batch)]
-        varied = [vary(sample, self._grid, random, self._settings.least_points) for sample in samples]
-        pillars = stacked([fill_pillars(one.points, self._grid, self._most_points) for one in varied], self._grid)
-        targets = [_targets(one, self._settings.least_points) for one in varied]
-        return pillars, self._target_maps(targets, self._grid, LOSS_MARGIN)
 
 
 def _with_frames(recordings: Sequence[SampledRecording]) -> list[SampledRecording]:

@@ -10,7 +10,7 @@ from seip_addon.core.sensing.lidar.catalogue import load_catalogue
 from seip_addon.core.sensing.lidar.noisy_returns import measured_returns
 from seip_addon.core.sensing.recordings.background import background_of
 from seip_addon.core.sensing.recordings.ray_grid import RayGrid
-from seip_addon.core.sensing.scans.scanner import MovingTraffic, ReflectiveSurface, Scanner
+from seip_addon.core.sensing.scans.scanner import ReflectiveSurface, Scanner
 from seip_addon.core.sensing.scans.sensor import MountedSensor
 from seip_addon.core.sensing.visibility.ray_casting import make_ray_caster
 from seip_addon.core.site.scene_geometry import Mesh
@@ -84,7 +84,7 @@ def street_ranges(surface, sensor, sweeps, seed, vehicles=0):
     """
     model = sensor.model
     random = np.random.default_rng(seed)
-    scan = Scanner(sensor, surface).scan(MovingTraffic((), (), np.zeros((0, 1, 3))), 0)
+    scan = Scanner(sensor, surface).scan((), (), np.zeros((0, 1, 3)), 0)
     directions = BeamPattern(model).directions(np.arange(len(scan.distance))) @ sensor.orientation.T
     ranges = np.full((sweeps, len(scan.distance)), np.inf, dtype=np.float32)
     for sweep in range(sweeps):

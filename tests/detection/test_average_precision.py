@@ -49,9 +49,9 @@ def test_example_with_one_missed_and_two_false():
     )
     evaluation = evaluate([told], AT_07)
     assert evaluation.average_precision == pytest.approx(5 / 9, abs=1e-15)
-    curve = precision_recall(evaluation)
-    assert curve.precision.tolist() == pytest.approx([1, 1 / 2, 2 / 3, 2 / 4])
-    assert curve.recall.tolist() == pytest.approx([1 / 3, 1 / 3, 2 / 3, 2 / 3])
+    _, precision, recall = precision_recall(evaluation)
+    assert precision.tolist() == pytest.approx([1, 1 / 2, 2 / 3, 2 / 4])
+    assert recall.tolist() == pytest.approx([1 / 3, 1 / 3, 2 / 3, 2 / 3])
     assert evaluation.wanted.score.tolist() == [0.9, 0.7, -math.inf]
     # F1 is 2/4, 2/5, 4/6 and 4/7 (twice the hits over detections plus road users): the third is best.
     assert balanced_score(evaluation) == 0.7

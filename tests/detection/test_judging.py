@@ -197,7 +197,7 @@ def test_the_command_again_gives_the_same_bytes_and_scans_nothing(judged, small_
     def refuse(*_):
         raise AssertionError("detected again")
 
-    monkeypatch.setattr(shared_scans, "_detected", refuse)
+    monkeypatch.setattr(shared_scans, "detect", refuse)
     place.main([str(small_scene), "-o", str(judged), *QUICK, "--finalists", "3"])
     assert json.dumps(asdict(load_placement(judged / "placement.json").judgement)) == json.dumps(
         asdict(before.judgement)

@@ -1,14 +1,19 @@
-"""Pillars against a slow loop, and what must not matter to them."""
+"""Pillars against a slow loop, what must not matter to them, and the area of a site: heights above the road."""
 
 import math
 
+from headless.detection.detection_area import area_of
 from headless.detection.network import PillarEncoder
 from headless.detection.pillars import PillarGrid, fill_pillars
 
 import numpy as np
+import shapely
 import torch
 from hypothesis import given
 from hypothesis import strategies as st
+
+from seip_addon.core.site.scene_geometry import Mesh, SceneGeometry
+from tests.builders.street_clouds import cloud_frame
 
 GRID = PillarGrid(west=-3.0, south=-2.0, bottom=-1.0, top=4.0, columns=12, rows=8, pillar=0.5)
 
@@ -102,3 +107,30 @@ def test_the_encoder_takes_the_maximum_of_each_pillar():
         scaled = (linear - normal.running_mean) / torch.sqrt(normal.running_var + normal.eps)
         expected = (scaled * normal.weight + normal.bias).clamp(min=0).max(dim=0).values
         torch.testing.assert_close(got[number], expected, atol=1e-5, rtol=1e-5)
+
+
+def hill(slope=0.06, across=0.02, base=100.0, half=24.0):
+    """A square road that rises to the east and a little to the north."""
+    corners = np.array([[x, y, base + slope * x + across * y] for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))])
+    corners[:, :2] *= half
+    corners[:, 2] = base + slope * corners[:, 0] + across * corners[:, 1]
+    road = Mesh("road", corners[[[0, 1, 2], [0, 2, 3]]])
+    return SceneGeometry("Hill", np.zeros(3), (road,), (), (), shapely.box(-16, -16, 16, 16))
+
+
+def test_heights_are_those_above_the_road():
+    area = area_of(hill(), 0.4)
+    random = np.random.default_rng(1)
+    xy = random.uniform(-15.9, 15.9, (500, 2))
+    above = random.uniform(-0.9, 4.4, 500)
+    z = 100 + 0.06 * xy[:, 0] + 0.02 * xy[:, 1] + above
+    cloud = area.cloud(cloud_frame(np.column_stack((xy, z, np.full(500, 0.5))).astype(np.float32)))
+    np.testing.assert_allclose(cloud[:, 2], above, atol=1e-4)
+    np.testing.assert_array_equal(cloud[:, 3], np.float32(0.5))
+
+
+def test_boxes_come_back_to_where_they_were():
+    area = area_of(hill(), 0.4)
+    boxes = np.column_stack([np.random.default_rng(2).uniform(-15, 15, (50, 3)), np.ones((50, 4))])
+    np.testing.assert_allclose(area.raised(area.levelled(boxes)), boxes, atol=1e-12)
+    assert not np.allclose(area.levelled(boxes), boxes)

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 torch = pytest.importorskip("torch", reason="the detector's torch is optional")
 
-from headless.detection.rotated_boxes import iou_matrix, iou_matrix_3d, paired_iou, paired_iou_3d, suppress  # noqa: E402
+from headless.detection.rotated_boxes import iou_matrix, paired_iou, suppress  # noqa: E402
 
 EXACT = 1e-9
 GRID = 1e-13  # lengths of the first box
@@ -39,6 +39,14 @@ def by_shapely(a, b):
     there[:, :4] /= scale
     shared = shapely.area(shapely.intersection(outlines(here), outlines(there), grid_size=GRID))
     return shared / (here[:, 2] * here[:, 3] + there[:, 2] * there[:, 3] - shared)
+
+
+def upright(plan, z=0.0, height=1.0):
+    """Boxes (n, 7) that stand over boxes in plan (n, 5)."""
+    count = len(plan)
+    return torch.from_numpy(
+        np.column_stack([plan[:, :2], np.full(count, z), plan[:, 2:4], np.full(count, height), plan[:, 4]])
+    )
 
 
 def random_boxes(rng, count, *, reach=6.0):
@@ -89,7 +97,7 @@ def varied_pairs(count):
 
 def test_pairs_agree_with_shapely():
     a, b, kinds = varied_pairs(3_000)
-    ours = paired_iou(torch.from_numpy(a), torch.from_numpy(b)).numpy()
+    ours = paired_iou(upright(a), upright(b)).numpy()
     wrong = np.abs(ours - by_shapely(a, b))
     assert wrong.max() < EXACT, f"{wrong.max()} in pairs of kind {kinds[wrong.argmax()]}"
     assert np.all(ours[kinds == 1] == pytest.approx(1, abs=EXACT))
@@ -100,35 +108,28 @@ def test_overlap_in_space_by_hand():
     box = torch.tensor([[0, 0, 1, 4, 2, 2, 0]], dtype=torch.float64)  # from z 0 to 2
     raised = torch.tensor([[1, 0, 2, 4, 2, 2, math.pi]], dtype=torch.float64)  # shares 6 × 1 of 16 + 16 − 6
     above = torch.tensor([[0, 0, 3, 4, 2, 2, 0]], dtype=torch.float64)  # stands on it
-    assert paired_iou_3d(box, raised).item() == pytest.approx(6 / 26, abs=1e-15)
-    assert paired_iou_3d(box, above).item() == 0
-    assert paired_iou_3d(box, box).item() == pytest.approx(1, abs=1e-15)
+    found = [paired_iou(box, other, in_space=True).item() for other in (raised, above, box)]
+    assert found == pytest.approx([6 / 26, 0, 1], abs=1e-15)
 
 
-def test_matrices_hold_every_pair():
+@pytest.mark.parametrize("in_space", [False, True])
+def test_matrices_hold_every_pair(in_space):
     rng = np.random.default_rng(2)
-    plan = random_boxes(rng, 70, reach=25)
-    a, b = torch.from_numpy(plan[:40]), torch.from_numpy(plan[40:])
-    i, j = torch.meshgrid(torch.arange(40), torch.arange(30), indexing="ij")
-    assert torch.allclose(iou_matrix(a, b).ravel(), paired_iou(a[i.ravel()], b[j.ravel()]), rtol=0, atol=1e-15)
-    assert 0.01 < (iou_matrix(a, b) > 0).double().mean() < 0.5
-    solid = np.column_stack([plan[:, :2], rng.uniform(0, 2, 70), plan[:, 2:4], rng.uniform(1, 3, 70), plan[:, 4]])
-    a, b = torch.from_numpy(solid[:40]), torch.from_numpy(solid[40:])
-    assert torch.allclose(iou_matrix_3d(a, b).ravel(), paired_iou_3d(a[i.ravel()], b[j.ravel()]), rtol=0, atol=1e-15)
-
-
-coordinates = st.floats(-20, 20)
-sizes = st.floats(0.1, 15)
-boxes = st.tuples(coordinates, coordinates, sizes, sizes, st.floats(-10, 10))
+    boxes = upright(random_boxes(rng, 70, reach=25), rng.uniform(0, 2, 70), rng.uniform(1, 3, 70))
+    a, b = boxes[:40], boxes[40:]
+    i, j = (at.ravel() for at in torch.meshgrid(torch.arange(40), torch.arange(30), indexing="ij"))
+    found = iou_matrix(a, b, in_space=in_space)
+    assert torch.allclose(found.ravel(), paired_iou(a[i], b[j], in_space=in_space), rtol=0, atol=1e-15)
+    assert 0.01 < (found > 0).double().mean() < 0.5
 
 
 @given(st.lists(st.tuples(st.floats(0, 30), st.floats(0, 30), st.integers(0, 3)), max_size=25), st.floats(0.05, 0.9))
 def test_suppression_is_the_plain_loop(rows, threshold):
-    table = np.array([(x, y, 5, 2, x + y) for x, y, _ in rows]).reshape(-1, 5)
+    table = upright(np.array([(x, y, 5, 2, x + y) for x, y, _ in rows]).reshape(-1, 5))
     scores = np.array([score for *_, score in rows], dtype=float)
-    overlap = iou_matrix(torch.from_numpy(table), torch.from_numpy(table)).numpy()
+    overlap = iou_matrix(table, table).numpy()
     kept = []
     for row in sorted(range(len(rows)), key=lambda row: (-scores[row], row)):
         if all(overlap[best, row] <= threshold for best in kept):
             kept.append(row)
-    assert suppress(torch.from_numpy(table), torch.from_numpy(scores), threshold).tolist() == kept
+    assert suppress(table, torch.from_numpy(scores), threshold).tolist() == kept

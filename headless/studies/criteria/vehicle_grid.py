@@ -14,7 +14,7 @@ from shapely.geometry.base import BaseGeometry
 from seip_addon.core.base.arrays import Boolean, Float, Integer
 from seip_addon.core.sensing.lidar.beams import BeamPattern
 from seip_addon.core.sensing.lidar.model import LidarModel
-from seip_addon.core.sensing.scans.beam_culling import BeamWindows
+from seip_addon.core.sensing.scans.beam_culling import rays_towards
 from seip_addon.core.sensing.visibility.ray_casting import RayCaster
 
 CELLS = (20, 8, 6)  # along, across and up: about 0.25 m each on a car of 5.0 × 1.8 × 1.5 m
@@ -112,7 +112,7 @@ def log_misses(
         For each vehicle, the cells of the top, side and front view one after the other; `LEAST_LOG_MISS` at least.
     """
     # candidate pairs of vehicle and ray
-    vehicle, ray = BeamWindows(model).rays_towards((vehicles.corners - origin) @ orientation)
+    vehicle, ray = rays_towards(model, (vehicles.corners - origin) @ orientation)
     directions = BeamPattern(model).directions(ray) @ orientation.T
     # rays and boxes in the axes of each pair's vehicle
     rotation, size = vehicles.rotation, vehicles.size[vehicle]

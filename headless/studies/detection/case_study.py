@@ -15,11 +15,11 @@ from headless.detection.average_precision import ADVISED_TEST_RUNS, Evaluation, 
 from headless.detection.detector import Detector
 from headless.detection.detector_evaluation import AT_ONCE, detect_in_runs, side_by_side
 from headless.detection.frame_results import FrameResult
-from headless.detection.frames import LazyFrames, Recording, SampledRecording
+from headless.detection.frames import Recording, SampledRecording
 from headless.detection.recordings import MountedSensors, SampledRun, Simulator, poses_key, sampled_runs
 from headless.detection.rules import MAIN_RULE
 from headless.detection.settings import NetworkSettings, TrainingSettings
-from headless.detection.training import LearningCurve, TrainedDetector, make_deterministic, train
+from headless.detection.training import LearningCurve, make_deterministic, train
 from headless.studies.coverage.cells import COUNTS, Case, Cell, solve_cell
 
 import numpy as np
@@ -212,9 +212,15 @@ def simulate_training_set(
 
 def recorded(simulator: Simulator, configuration: MountedSensors, run: SampledRun) -> Recording:
     """Return the frames of a run, simulated on access."""
-    frames = LazyFrames(len(run.times), lambda number: simulator.frame(configuration, run, number))
-    name = f"{configuration.name} in {run.name}"
-    return Recording(name, run.key, frames, configuration.types, simulator.site, poses_key(configuration))
+    return Recording(
+        f"{configuration.name} in {run.name}",
+        run.key,
+        len(run.times),
+        lambda number: simulator.frame(configuration, run, number),
+        configuration.types,
+        simulator.site,
+        poses_key(configuration),
+    )
 
 
 def simulate_all(recordings: Sequence[SampledRecording]) -> Generator[Progress, None, None]:
@@ -236,7 +242,7 @@ def train_all(  # noqa: PLR0913  # what a training depends on
     seeds: int,
     device: str,
     start: Detector | None = None,
-) -> Generator[Progress, None, list[TrainedDetector]]:
+) -> Generator[Progress, None, list[tuple[Detector, LearningCurve]]]:
     """Train a detector with each of the seeds 1 to ``seeds``, in parallel on the CPU.
 
     Parameters
@@ -273,7 +279,7 @@ def still_rises(curve: LearningCurve) -> bool:
 def evaluate_all(
     simulator: Simulator,
     configurations: Sequence[SensorConfiguration],
-    trained: Sequence[TrainedDetector],
+    trained: Sequence[tuple[Detector, LearningCurve]],
     traffic: Traffic,
     threads: int,
 ) -> Generator[Progress, None, list[DetectorOutcome]]:
@@ -284,13 +290,13 @@ def evaluate_all(
     threads : int
         CPU threads of torch; their number affects the exact result.
     """
-    runs, detectors = (*traffic.validation, *traffic.test), [one.detector for one in trained]
+    runs, detectors = (*traffic.validation, *traffic.test), [detector for detector, _ in trained]
     detections = [detect_in_runs(simulator, one, runs, detectors) for one in configurations]
     make_deterministic(threads)
     results = yield from side_by_side(detections, AT_ONCE)
     validated = sum(len(run.times) for run in traffic.validation)
     outcomes = []
-    for number, detector in enumerate(trained):
+    for number, (_, curve) in enumerate(trained):
         frames = [by_detector[number] for by_detector in results]
         # one score for each detector, whatever the sensors
         score = balanced_score(evaluate(list(chain(*(some[:validated] for some in frames))), MAIN_RULE))
@@ -303,7 +309,7 @@ def evaluate_all(
                     frames=tested,
                     evaluation=evaluate(tested, MAIN_RULE),
                     score=score,
-                    still_rising=still_rises(detector.curve),
+                    still_rising=still_rises(curve),
                 )
             )
     return outcomes

@@ -104,9 +104,9 @@ def run_study(  # noqa: PLR0913  # a site, its placements, and how detectors are
     training_set = watch.run("simulation", simulating)
     learning = case_study.train_all(training_set, network, training, folder, seeds=seeds, device=device, start=start)
     trained = watch.run("training", learning)
-    for seed, one in enumerate(trained, start=1):
+    for seed, (_, curve) in enumerate(trained, start=1):
         name = f"detector-{seed}"
-        save_training_chart(folder / f"{name}.png", one.curve.loss, one.curve.validation, name)
+        save_training_chart(folder / f"{name}.png", curve.loss, curve.validation, name)
     evaluating = case_study.evaluate_all(simulator, configurations, trained, traffic, training.threads)
     outcomes = watch.run("evaluation", evaluating)
     return StudyResults(site.surveyed.site.name, simulator, traffic, tuple(outcomes))

@@ -75,13 +75,11 @@ def main(argv: list[str]) -> None:
     )
     store = options.output / "training.pt"
     steps = train(training_recordings, validation, NETWORK, training, device=options.device, store=store)
-    trained = runtime.finish_with_bar(steps)
-    best = trained.curve.best
-    trained.detector.save(options.output / "detector.pt", half=True)
-    save_training_chart(options.output / "training.png", trained.curve.loss, trained.curve.validation, "training")
-    runtime.print_line(
-        f"best after {best:,} steps: average precision {trained.curve.validation[best]:.1%} at sites set aside"
-    )
+    detector, curve = runtime.finish_with_bar(steps)
+    best = curve.best
+    detector.save(options.output / "detector.pt", half=True)
+    save_training_chart(options.output / "training.png", curve.loss, curve.validation, "training")
+    runtime.print_line(f"best after {best:,} steps: average precision {curve.validation[best]:.1%} at sites set aside")
     runtime.print_line(f"written to {options.output}/")
 
 

@@ -59,7 +59,7 @@ def with_companions(trajectories: Trajectories, seed: int) -> Generator[Progress
         first=first,
         **{name: np.concatenate(parts) for name, parts in samples.items()},
     )
-    overlaps = yield from find_overlaps(grouped)
+    _, others = (yield from find_overlaps(grouped)).T
     kept = np.ones(len(grouped), dtype=np.bool_)
-    kept[overlaps.pair[:, 1][overlaps.pair[:, 1] >= len(trajectories)]] = False
+    kept[others[others >= len(trajectories)]] = False
     return some_users(grouped, kept)

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from headless.detection.detection_area import DetectionArea
-from headless.detection.frames import LazyFrames, Recording
+from headless.detection.frames import Recording
 from headless.detection.shared_scans import POINT_FIELDS, some_points
 
 import numpy as np
@@ -61,10 +61,10 @@ def field_recording(
 
     def frame(number: int) -> Frame:
         random = np.random.default_rng([*seed, number])
-        simulated = recording.frames[number]
+        simulated = recording.load(number)
         return field_frame(simulated, area, sensors, random) if random.random() < SHARE else simulated
 
-    return replace(recording, frames=LazyFrames(len(recording.frames), frame))
+    return replace(recording, load=frame)
 
 
 def field_frame(

@@ -133,20 +133,10 @@ def record(
         folder / "frame.png", next(load_frames(folder))[1], run.static.region, run.sensors, run.static.attribution
     )
     for key in settings.formats:
-        target = dataset_folder(folder, settings, key)
-        yield from write_dataset(FORMATS[key], load_frames(folder), _traffic_run(folder, run, settings), target)
+        name, sensors = folder.resolve().name, tuple(run.sensors)
+        traffic = TrafficRun(name, settings.split, run.key, sensors, run.origin, run.record())
+        yield from write_dataset(FORMATS[key], load_frames(folder), traffic, dataset_folder(folder, settings, key))
     return manifest
-
-
-def _traffic_run(folder: Path, run: Run, settings: RecordingSettings) -> TrafficRun:
-    return TrafficRun(
-        name=folder.resolve().name,
-        split=settings.split,
-        key=run.key,
-        sensors=tuple(run.sensors),
-        origin=run.origin,
-        record=run.record(),
-    )
 
 
 def dataset_folder(folder: Path, settings: RecordingSettings, key: str) -> Path:

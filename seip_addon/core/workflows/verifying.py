@@ -81,7 +81,7 @@ def verify(
     own = of_recorded(recording, {one.label: one for one in planned}, "the plan")
     pairs = [(own[record.name], record) for record in recording.sensors]
     static = static_scene(geometry, planned)
-    surface = _surface(static, engine)
+    surface = ReflectiveSurface(make_ray_caster(static.triangles, engine), static.reflectivity)
     fitted: list[tuple[Registration, Background]] = []
     for sensor, record in pairs:
         background = yield from learn_background(record, sensor.model)
@@ -203,10 +203,6 @@ def _is_at(change: Change, earlier: BaseGeometry) -> bool:
     """
     outline = shapely.MultiPoint(box_triangles(change.box).reshape(-1, 3)[:, :2]).convex_hull
     return bool(outline.intersection(earlier).area > outline.area / 2)
-
-
-def _surface(static: StaticScene, engine: Engine) -> ReflectiveSurface:
-    return ReflectiveSurface(make_ray_caster(static.triangles, engine), static.reflectivity)
 
 
 def _without_gone(comparison: RayComparison, changes: Sequence[Change]) -> RayComparison:

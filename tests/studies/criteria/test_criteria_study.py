@@ -57,7 +57,7 @@ def test_a_finished_study_is_read_and_a_stopped_one_goes_on(study, small_scene, 
     def refuse(*_):
         raise AssertionError("detected again")
 
-    monkeypatch.setattr(shared_scans, "_detected", refuse)
+    monkeypatch.setattr(shared_scans, "detect", refuse)
     criteria_study.main([str(small_scene), "-o", str(study), *COARSE, *OPTIONS])
     assert (study / "criteria.json").read_bytes() == before
     (study / small_scene.stem / "type1" / "criteria.json").unlink()

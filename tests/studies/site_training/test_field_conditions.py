@@ -177,5 +177,5 @@ def test_companions_keep_near_the_one_they_walk_with(alone, grouped):
 
 
 def test_no_companion_overlaps_anyone(alone, grouped):
-    before = {tuple(pair) for pair in finish(find_overlaps(alone)).pair.tolist()}
-    assert {tuple(pair) for pair in finish(find_overlaps(grouped)).pair.tolist()} <= before
+    before = {tuple(pair) for pair in finish(find_overlaps(alone)).tolist()}
+    assert {tuple(pair) for pair in finish(find_overlaps(grouped)).tolist()} <= before

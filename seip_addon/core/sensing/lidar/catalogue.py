@@ -21,7 +21,6 @@ from .carla_dropoff import CarlaDropoff
 from .model import DetectionLaw, LidarModel
 from .range_equation import MAKER_PROBABILITY, RangeEquation
 
-_CALIBRATION_SUFFIXES = {".json", ".xml", ".yaml", ".yml", ".csv"}  # of single units, as makers deliver them
 CALIBRATED = (1.0, 1.0)
 SHEET_GAINS = (0.09, 2.3)
 """Gains that sweeps needed in addition to ranges with a reflectivity and a probability of detection."""
@@ -79,10 +78,6 @@ def load_catalogue(extra: Iterable[str | os.PathLike[str]] = ()) -> dict[str, Li
     """
     catalogue = dict(_shipped())
     for path in map(Path, extra):
-        if path.suffix.lower() in _CALIBRATION_SUFFIXES:
-            raise SeipError(
-                f"{path} is not a catalogue (.toml): write the elevations of your unit into a table of a catalogue"
-            )
         models = _parse(toml_text(path, "LiDAR catalogue"), str(path), catalogue)
         if not models:
             raise SeipError(f"{path} has no sensor: write [KEY] and its values below it")

@@ -1,12 +1,11 @@
-"""Labelled boxes of a sweep, in the formats of KITTI and OpenPCDet."""
+"""Labelled boxes of a sweep, in the format of OpenPCDet."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -18,7 +17,7 @@ from ...storage.files import content_fault, read_small
 from ..traffic.trajectories import CATEGORIES
 
 _MAX_BYTES = 1 << 26
-_CURE = "give the labels of one sweep as KITTI or OpenPCDet have them"
+_CURE = "give the labels of one sweep as OpenPCDet has them"
 
 _CATEGORY = {
     **{category: category for category in CATEGORIES},
@@ -28,9 +27,6 @@ _CATEGORY = {
     "personsitting": "pedestrian",
 }
 """Category of each class name, in lower case and without punctuation."""
-
-_Box = tuple[str, list[Any]]
-"""Class name, and x y z (middle), length, width, height, yaw."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,10 +50,9 @@ class BoxLabels:
 
 
 def read_labels(path: Path) -> BoxLabels:
-    """Read the labelled boxes of a sweep; the format is recognised by the content.
+    """Read the labelled boxes of a sweep: lines ``x y z dx dy dz heading class``, which a score may follow.
 
-    KITTI's labels are in the axes of a camera that stands in the sensor and looks along +x, as in datasets of this
-    program. A file without content has no labels.
+    A file without content has no labels.
 
     Raises
     ------
@@ -65,20 +60,22 @@ def read_labels(path: Path) -> BoxLabels:
         The file cannot be read, has another format or several frames, or a box is not one of a road user.
     """
     if path.is_file() and not path.stat().st_size:
-        return _labels([])
+        return BoxLabels(np.zeros((0, 7)), np.zeros(0, dtype=np.str_))
     text = read_small(path, _MAX_BYTES, _CURE).decode("utf-8-sig", "replace")
     try:
-        return _labels(_boxes(text))
+        return _labels([line.split() for line in text.splitlines() if line.strip()])
     except READ_ERRORS as error:
         raise SeipError(f"{path.name} has no readable labels ({content_fault(error)}); {_CURE}") from error
 
 
-def _labels(boxes: Iterable[_Box]) -> BoxLabels:
+def _labels(lines: Sequence[Sequence[str]]) -> BoxLabels:
     rows, categories = [], []
-    for name, row in boxes:
-        category = _CATEGORY.get(re.sub(r"[\W_]", "", name.lower()))
+    for words in lines:
+        if not 8 <= len(words) <= 9:
+            raise ValueError(f"a line has {len(words)} columns, not 8")
+        category = _CATEGORY.get(re.sub(r"[\W_]", "", words[7].lower()))
         if category is not None:
-            rows.append([float(number) for number in row])
+            rows.append([float(word) for word in words[:7]])
             categories.append(category)
     table = np.array(rows, dtype=np.float64).reshape(-1, 7)
     checks = {
@@ -90,23 +87,3 @@ def _labels(boxes: Iterable[_Box]) -> BoxLabels:
         raise ValueError(fault)
     table[:, 6] = np.mod(table[:, 6] + np.pi, 2 * np.pi) - np.pi
     return BoxLabels(table, np.array(categories, dtype=np.str_))
-
-
-def _boxes(text: str) -> Iterator[_Box]:
-    lines = [line.split() for line in text.splitlines() if line.strip()]
-    return map(_of_openpcdet if lines and len(lines[0]) < 15 else _of_kitti, lines)
-
-
-def _of_kitti(words: list[str]) -> _Box:
-    """Return a box of KITTI's ``label_2``: 15 columns, or 16 with a score."""
-    if not 15 <= len(words) <= 16:
-        raise ValueError(f"a line has {len(words)} columns, not 15")
-    height, width, length, x, y, z, rotation = (float(word) for word in words[8:15])
-    return words[0], [z, -x, height / 2 - y, length, width, height, -rotation - np.pi / 2]
-
-
-def _of_openpcdet(words: list[str]) -> _Box:
-    """Return a box of a line ``x y z dx dy dz heading class``, which a score may follow."""
-    if not 8 <= len(words) <= 9:
-        raise ValueError(f"a line has {len(words)} columns, not 8")
-    return words[7], list(words[:7])

@@ -77,7 +77,7 @@ class Change:
     kind : {"new", "gone", "vehicle"}
         Whether the scene lacks it, it is no longer there, or it is a vehicle that stands on the road.
     name : str
-        Name of the scene's object, ``Found 1`` or ``Vehicle 1``.
+        Name of the scene's object; "" for new objects.
     box : (7,) float64
         x, y, z of the middle, length, width, height (metres), yaw (radians).
     rays : int
@@ -132,7 +132,7 @@ def new_objects(comparisons: Sequence[RayComparison], road: Callable[[Float], Fl
     traffic = points[:, 2] < road(points[:, :2]) + MOST_VEHICLE_HEIGHT  # false beside the road
     traffic &= ~_overhanging(points, traffic)
     found = []
-    for kind, words, some in (("new", "Found", points[~traffic]), (VEHICLE, "Vehicle", points[traffic])):
+    for kind, some in (("new", points[~traffic]), (VEHICLE, points[traffic])):
         groups = [some[group] for group in _groups(some) if len(group) >= _LEAST_RAYS]
         spans = [np.quantile(group[:, 2], [0.02, 0.98]) for group in groups]
         boxes = [
@@ -141,8 +141,7 @@ def new_objects(comparisons: Sequence[RayComparison], road: Callable[[Float], Fl
             if span[1] - span[0] >= _LEAST_HEIGHT
         ]
         boxes.sort(key=lambda one: (-one[0], one[1].tolist()))
-        none = np.zeros(0, dtype=np.int64)
-        found += [Change(kind, f"{words} {number}", box, rays, none) for number, (rays, box) in enumerate(boxes, 1)]
+        found += [Change(kind, "", box, rays, np.zeros(0, dtype=np.int64)) for rays, box in boxes]
     return found
 
 
@@ -175,8 +174,8 @@ def gone_objects(comparisons: Sequence[RayComparison], meshes: Sequence[Mesh], t
     part_of, parts = _connected_parts(meshes, triangles)
     passed, stopped = np.zeros(len(parts), dtype=np.int64), np.zeros(len(parts), dtype=np.int64)
     for one in comparisons:
-        for counts, results in ((passed, (FARTHER,)), (stopped, (AGREES,))):
-            rays = np.isin(one.result, results) & (one.triangle >= 0)
+        for counts, result in ((passed, FARTHER), (stopped, AGREES)):
+            rays = (one.result == result) & (one.triangle >= 0)
             part = part_of[one.triangle[rays]]
             np.add.at(counts, part[part >= 0], 1)
     found = []

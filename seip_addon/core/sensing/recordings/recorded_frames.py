@@ -249,11 +249,16 @@ def _instances(points: NDArray[np.float32], boxes: Float) -> NDArray[np.int32]:
         reach = np.hypot(length, width) / 2
         near = np.flatnonzero((np.abs(points[:, 0] - x) <= reach) & (np.abs(points[:, 1] - y) <= reach))
         offset = points[near].astype(np.float64) - (x, y, z)
-        along = offset[:, 0] * np.cos(yaw) + offset[:, 1] * np.sin(yaw)
-        across = offset[:, 1] * np.cos(yaw) - offset[:, 0] * np.sin(yaw)
-        inside = (np.abs(along) <= length / 2) & (np.abs(across) <= width / 2) & (np.abs(offset[:, 2]) <= height / 2)
-        instance[near[inside]] = number
+        instance[near[within_box(offset, (length, width, height), yaw)]] = number
     return instance
+
+
+def within_box(offset: Float, size: tuple[float, float, float], yaw: float) -> Boolean:
+    """Return which points (n, 3), from the middle of an upright box of given length, width and height, lie in it."""
+    ahead = np.cos(yaw) * offset[:, 0] + np.sin(yaw) * offset[:, 1]
+    aside = np.cos(yaw) * offset[:, 1] - np.sin(yaw) * offset[:, 0]
+    inside: Boolean = (np.abs(np.stack([ahead, aside, offset[:, 2]], axis=1)) <= np.array(size) / 2).all(axis=1)
+    return inside
 
 
 def _labels(

@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ...base.arrays import Boolean, Float
+from ...base.arrays import Float
 from ...base.estimates import student_quantile
 from ..lidar.carla_dropoff import CarlaDropoff
 from ..lidar.noisy_returns import return_chance
@@ -32,7 +32,7 @@ def fitted_gain(one: RayComparison) -> Gain | None:
     number of sectors, since few of them have most of the doubtful rays.
     """
     model = one.sensor.model
-    rays = _comparable(one)
+    rays = np.isin(one.result, (AGREES, NOTHING)) & (one.predicted >= model.min_range)
     if isinstance(model.law, CarlaDropoff) or rays.sum() < _LEAST_RAYS:
         return None
     distance, reflected, returned = one.predicted[rays], one.reflected[rays], one.returned[rays]
@@ -73,9 +73,3 @@ def _root(chance: Callable[[float], Float], returned: Float, weight: Float) -> f
         else:
             high = middle
     return (low + high) / 2
-
-
-def _comparable(one: RayComparison) -> Boolean:
-    """Return the rays whose surface is as predicted, or that do not return from it."""
-    rays: Boolean = np.isin(one.result, (AGREES, NOTHING)) & (one.predicted >= one.sensor.model.min_range)
-    return rays

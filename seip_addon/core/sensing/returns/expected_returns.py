@@ -13,9 +13,7 @@ law, unless the ray is stopped before by the static scene, at a horizontal dista
     R = \sum_{\text{free rays on the panel}} P(r, ρ \cos ε).
 
 All rays of a channel have the same elevation, so that P is the same for all rays of a channel on a panel, and these
-rays are neighbours. Rays that meet some panel are cast once for all panels. The number of free rays follows from the
-smallest distance among neighbours, which a sparse table gives (Bender and Farach-Colton 2000): if it is at least d, all
-are free; only otherwise are rays counted one by one.
+rays are neighbours. Rays that meet some panel are cast once for all panels.
 """
 
 from __future__ import annotations
@@ -25,7 +23,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...base.arrays import Boolean, Float, Integer, concatenated_ranges
+from ...base.arrays import Float, Integer, concatenated_ranges
+from ..lidar.beam_windows import channels_between, steps_in_arcs
 from ..lidar.beams import BeamPattern
 from ..lidar.model import LidarModel
 from ..visibility.ray_casting import RayCaster
@@ -96,7 +95,7 @@ def expected_returns(
     """
     if is_upright(orientation):
         return upright_returns(caster, origin, yaw_of(orientation), model, users)
-    return all_ray_returns(caster, origin, orientation, model, users)
+    return _all_ray_returns(caster, origin, orientation, model, users)
 
 
 def upright_returns(
@@ -118,57 +117,35 @@ def upright_returns(
     cast : int
         Number of rays.
     """
-    panels = PanelRows.seen_from(origin, users)
-    steps, step = model.azimuth_count, model.azimuth_step
-    order = np.argsort(model.elevations, kind="stable")
-    elevation = model.elevations[order]
-    item, channel = _channels_on(panels, np.tan(elevation))
-    level = np.cos(elevation)[channel]
-    distance = panels.distance[item]
-    ranged = distance / level
+    panels, steps = PanelRows.seen_from(origin, users), model.azimuth_count
+    unit = np.ones(len(users))
+    item, channel = channels_between(model, panels.low, panels.high, unit, unit)
+    level = np.cos(model.elevations)
+    ranged = panels.distance[item] / level[channel]
     within = (ranged >= model.min_range) & (ranged <= model.max_range)
-    item, channel, level = item[within], channel[within], level[within]
-    distance, ranged = distance[within], ranged[within]
-    ahead = panels.azimuth[item] - (yaw + model.azimuth_offsets[order] + model.first_azimuth)[channel]
-    if not model.all_round:  # the field of view begins at step 0: a panel lies before or behind its middle
-        middle = (steps - 1) / 2 * step
-        ahead = middle + (ahead - middle + math.pi) % math.tau - math.pi
-    first = np.ceil((ahead - panels.half[item]) / step).astype(np.int64)
-    last = np.floor((ahead + panels.half[item]) / step).astype(np.int64)
-    if not model.all_round:
-        first, last = np.maximum(first, 0), np.minimum(last, steps - 1)
-    count = np.minimum(last - first + 1, steps)
-    there = np.flatnonzero(count > 0)
-    if not len(there):
+    item, channel, ranged = item[within], channel[within], ranged[within]
+    ahead = panels.azimuth[item] - (yaw + model.azimuth_offsets + model.first_azimuth)[channel]
+    row, first, count = steps_in_arcs(ahead, panels.half[item], model.azimuth_step, steps, all_round=model.all_round)
+    if not len(row):
         return np.zeros(len(users)), 0
-    item, channel, first, count = item[there], channel[there], first[there] % steps, count[there]
-    rows, row = np.unique(channel, return_inverse=True)
-    wanted = _wanted(row, first, count, len(rows), steps)
-    cast = np.flatnonzero(wanted)
-    directions = BeamPattern(model, yaw).directions(order[rows[cast // steps]] * steps + cast % steps)
-    free = np.full(wanted.shape, np.inf)
-    free.ravel()[cast] = caster.cast(origin, directions, model.max_range)[0] * np.cos(elevation[rows[cast // steps]])
-    number = _at_least(np.concatenate([free, free], axis=1), row, first, count, distance[there])
-    chance = model.law.chance(ranged[there], panels.reflected[item] * level[there])
+    item, channel, ranged = item[row], channel[row], ranged[row]
+    ray = np.repeat(channel * steps, count) + concatenated_ranges(first, count) % steps
+    met = np.zeros(model.channels * steps, dtype=bool)
+    met[ray] = True
+    cast = np.flatnonzero(met)
+    free = np.zeros(len(met))
+    distance, _ = caster.cast(origin, BeamPattern(model, yaw).directions(cast), model.max_range)
+    free[cast] = distance * level[cast // steps]
+    reaches = free[ray] >= np.repeat(panels.distance[item], count)
+    number = np.add.reduceat(reaches, np.cumsum(count) - count, dtype=np.int64)
+    chance = model.law.chance(ranged, panels.reflected[item] * level[channel])
     return _summed(item, chance * number, users), len(cast)
 
 
-def all_ray_returns(
+def _all_ray_returns(
     caster: RayCaster, origin: Float, orientation: Float, model: LidarModel, users: RoadUsers
 ) -> tuple[Float, int]:
-    """Compute the expected returns of a sensor of any pattern and orientation from each road user.
-
-    Parameters
-    ----------
-    orientation : (3, 3) float64
-        Rotation from the sensor's axes to the site's.
-
-    Returns
-    -------
-    returns : (m,) float64
-    cast : int
-        Number of rays.
-    """
+    """Compute the expected returns of a sensor of any orientation; see `expected_returns`."""
     panels = PanelRows.seen_from(origin, users)
     directions = BeamPattern(model).directions(np.arange(model.channels * model.azimuth_count)) @ orientation.T
     level = np.hypot(directions[:, 0], directions[:, 1])
@@ -191,65 +168,6 @@ def all_ray_returns(
 
 def _summed(item: Integer, chance: Float, users: RoadUsers) -> Float:
     return np.bincount(item, chance, minlength=len(users)).astype(np.float64)
-
-
-def _channels_on(panels: PanelRows, tangent: Float) -> tuple[Integer, Integer]:
-    """Return all pairs of a panel and a channel whose elevation it covers, (k,) int64 each.
-
-    Parameters
-    ----------
-    tangent : (c,) float64
-        Tangents of the channels' elevations, ascending.
-    """
-    first = np.searchsorted(tangent, panels.low, "left")
-    count = np.maximum(np.searchsorted(tangent, panels.high, "right") - first, 0)
-    item = np.repeat(np.arange(len(first)), count)
-    return item, concatenated_ranges(first, count)
-
-
-def _wanted(row: Integer, first: Integer, count: Integer, rows: int, steps: int) -> Boolean:
-    """Return the azimuth steps of each channel that meet some panel, (rows, steps) bool."""
-    # Each run adds 1 at its first step and takes it off behind its last: running sums are above 0 within runs. Runs
-    # that pass the last step go on in a second turn, which is joined with the first.
-    width = 2 * steps + 1
-    size = rows * width
-    change = np.bincount(row * width + first, minlength=size) - np.bincount(row * width + first + count, minlength=size)
-    met = np.cumsum(change.reshape(rows, width), axis=1)[:, : 2 * steps] > 0
-    wanted: Boolean = met[:, :steps] | met[:, steps:]
-    return wanted
-
-
-def _at_least(values: Float, row: Integer, first: Integer, count: Integer, least: Float) -> Integer:
-    """Return the number of values that are at least ``least`` among ``count`` neighbours in a row, (k,) int64.
-
-    Parameters
-    ----------
-    values : (rows, n) float64
-        Rows of values.
-    row, first, count, least : (k,)
-        Row, first column, number of neighbours and limit of each query; ``first + count`` is at most n.
-    """
-    # Sparse table: the minimum of 2^e neighbours is that of two overlapping or adjacent ranges of half the size. Any
-    # run is covered by two ranges of the largest power of two within it, one from its beginning and one to its end.
-    # Most runs are free as a whole, and need no counting.
-    smallest = np.empty(len(row))
-    power = np.frexp(count.astype(np.float64))[1] - 1  # exponent of the largest power of two up to the count
-    table = values
-    for exponent in range(int(power.max()) + 1):
-        if exponent:
-            shift = 1 << (exponent - 1)
-            table = np.minimum(table[:, :-shift], table[:, shift:])
-        these = np.flatnonzero(power == exponent)
-        begin, end = first[these], first[these] + count[these] - (1 << exponent)
-        smallest[these] = np.minimum(table[row[these], begin], table[row[these], end])
-    number = count.copy()
-    partly = np.flatnonzero(smallest < least)
-    if len(partly):
-        own = count[partly]
-        place = concatenated_ranges(row[partly] * values.shape[1] + first[partly], own)
-        reaches = values.ravel()[place] >= np.repeat(least[partly], own)
-        number[partly] = np.add.reduceat(reaches, np.cumsum(own) - own, dtype=np.int64)
-    return number
 
 
 def _rays_on(panels: PanelRows, azimuth: Float, rise: Float) -> tuple[Integer, Integer]:

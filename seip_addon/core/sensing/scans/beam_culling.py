@@ -7,64 +7,38 @@ import math
 import numpy as np
 
 from ...base.arrays import Float, Integer, concatenated_ranges
-from ..lidar.azimuth_steps import steps_in_arcs
+from ..lidar.beam_windows import channels_between, steps_in_arcs
 from ..lidar.model import LidarModel
 
 
-class BeamWindows:
-    """Index of a model's rays by direction, to find those that pass through convex hulls of points.
+def rays_towards(model: LidarModel, points: Float) -> tuple[Integer, Integer]:
+    """Find all rays that pass through convex hulls of points, and few that do not.
 
-    A ray has the number ``channel * azimuth_count + step``, as in `BeamPattern`.
+    Parameters
+    ----------
+    points : (k, m, 3) float64, metres
+        m points of each of k hulls, in the sensor's axes.
+
+    Returns
+    -------
+    hull : (p,) int64
+        Hull of each pair, ascending.
+    ray : (p,) int64
+        Ray of each pair: ``channel * azimuth_count + step``, as in `BeamPattern`.
     """
-
-    def __init__(self, model: LidarModel) -> None:
-        self._steps, self._reach = model.azimuth_count, model.max_range
-        self._channel = np.argsort(model.elevations, kind="stable")
-        self._slope = np.tan(model.elevations[self._channel])
-        self._zero = model.azimuth_offsets + model.first_azimuth
-        self._size, self._all_round = model.azimuth_step, model.all_round
-
-    def rays_towards(self, points: Float) -> tuple[Integer, Integer]:
-        """Find all rays that pass through hulls, and few that do not.
-
-        Parameters
-        ----------
-        points : (k, m, 3) float64, metres
-            m points of each of k hulls, in the sensor's axes.
-
-        Returns
-        -------
-        hull : (p,) int64
-            Hull of each pair, ascending.
-        ray : (p,) int64
-            Ray of each pair.
-        """
-        # A hull lies in an arc of azimuths and in a range of slopes. Every channel within these slopes is paired with
-        # the hull, and of its azimuth steps those within the arc are taken. Channels differ in the azimuth of step 0.
-        middle, half, near = _azimuths(points)
-        hull, channel = self._channels_at(points, near)
-        arc, first, count = steps_in_arcs(
-            middle[hull] - self._zero[channel], half[hull], self._size, self._steps, all_round=self._all_round
-        )
-        # An arc may run over step 0 of an all-round channel: its steps wrap. The rows of a hull in a channel have no
-        # step in common, so that no ray comes twice for a hull.
-        steps = concatenated_ranges(first, count) % self._steps
-        return np.repeat(hull[arc], count), np.repeat(channel[arc] * self._steps, count) + steps
-
-    def _channels_at(self, points: Float, near: Float) -> tuple[Integer, Integer]:
-        """Return pairs of hulls and channels that are within the hull's heights somewhere over its distances."""
-        # The slope to an edge of a given height is most extreme at the near or at the far side, by the sign of the
-        # height. In order of slope, the channels between the two are one slice, found by bisection.
-        bottom, top = points[:, :, 2].min(axis=1), points[:, :, 2].max(axis=1)
-        far = np.hypot(points[:, :, 0], points[:, :, 1]).max(axis=1)
-        with np.errstate(divide="ignore"):  # at distance zero everything is straight above or below
-            least = bottom / np.where(bottom < 0, near, far)
-            most = top / np.where(top > 0, near, far)
-        low = np.searchsorted(self._slope, least)
-        count = np.maximum(np.searchsorted(self._slope, most, side="right") - low, 0)
-        # hulls out of range are left out: no ray towards them can hit anything in them
-        count[near > self._reach] = 0
-        return np.repeat(np.arange(len(points)), count), self._channel[concatenated_ranges(low, count)]
+    # A hull lies in an arc of azimuths and in a range of slopes. Every channel within these slopes is paired with the
+    # hull, and of its azimuth steps those within the arc are taken. Channels differ in the azimuth of step 0.
+    middle, half, near = _azimuths(points)
+    far = np.hypot(points[:, :, 0], points[:, :, 1]).max(axis=1)
+    hull, channel = channels_between(model, points[:, :, 2].min(axis=1), points[:, :, 2].max(axis=1), near, far)
+    zero = (model.azimuth_offsets + model.first_azimuth)[channel]
+    arc, first, count = steps_in_arcs(
+        middle[hull] - zero, half[hull], model.azimuth_step, model.azimuth_count, all_round=model.all_round
+    )
+    # An arc may run over step 0 of an all-round channel: its steps wrap. The rows of a hull in a channel have no step
+    # in common, so that no ray comes twice for a hull.
+    steps = concatenated_ranges(first, count) % model.azimuth_count
+    return np.repeat(hull[arc], count), np.repeat(channel[arc] * model.azimuth_count, count) + steps
 
 
 def _azimuths(points: Float) -> tuple[Float, Float, Float]:

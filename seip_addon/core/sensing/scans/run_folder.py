@@ -31,27 +31,13 @@ Record = dict[str, Any]
 
 
 @dataclass(frozen=True)
-class _StoredSensor:
-    """Part of a sensor in a manifest that is read."""
-
-    sensor: str
-
-
-@dataclass(frozen=True)
-class _StoredTraffic:
-    """Part of the trajectories in a manifest that is read."""
-
-    source: str
-
-
-@dataclass(frozen=True)
 class _StoredRun:
     """Part of a manifest that is read."""
 
     key: str
     complete: bool
-    sensors: tuple[_StoredSensor, ...]
-    trajectories: _StoredTraffic
+    sensors: tuple[Mapping[str, object], ...]
+    trajectories: Mapping[str, object]
     frames: tuple[Mapping[str, object], ...]
 
 

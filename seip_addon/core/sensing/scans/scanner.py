@@ -16,7 +16,7 @@ from ...base.arrays import Boolean, Float, Integer
 from ..lidar.beams import BeamPattern
 from ..lidar.noisy_returns import return_chance
 from ..visibility.ray_casting import RayCaster
-from .beam_culling import BeamWindows
+from .beam_culling import rays_towards
 from .frame import STATIC_INSTANCE
 from .motion import Motion
 from .sensor import MountedSensor
@@ -85,33 +85,14 @@ class BodySurface(ReflectiveSurface):
         return placed.reshape(-1, 3)
 
 
-@dataclass(frozen=True, eq=False)
-class MovingTraffic:
-    """The k road users that move during a revolution.
-
-    Parameters
-    ----------
-    motions : sequence of Motion
-        Motion of each road user.
-    shapes : sequence of BodySurface
-        Shape of each road user, in the same order.
-    hulls : (k, m, 3) float64, metres
-        Points whose convex hull contains each motion, in site axes.
-    """
-
-    motions: Sequence[Motion]
-    shapes: Sequence[BodySurface]
-    hulls: Float
-
-    @classmethod
-    def of(cls, motions: Sequence[Motion], shapes: Sequence[BodySurface]) -> MovingTraffic:
-        """Return the motions with their hulls, given the shape of each road user."""
-        hulls = [shape.hull(motion) for motion, shape in zip(motions, shapes, strict=True)]
-        # Motions have different numbers of samples. Shorter hulls repeat their last point, which changes no convex
-        # hull, so that all fit into one array.
-        most = max(map(len, hulls), default=0)
-        even = [np.concatenate([hull, np.repeat(hull[-1:], most - len(hull), axis=0)]) for hull in hulls]
-        return cls(motions, shapes, np.array(even).reshape(len(hulls), most, 3))
+def hulls_of(motions: Sequence[Motion], shapes: Sequence[BodySurface]) -> Float:
+    """Return points (k, m, 3), in site axes, whose convex hulls contain the motions of k road users."""
+    hulls = [shape.hull(motion) for motion, shape in zip(motions, shapes, strict=True)]
+    # Motions have different numbers of samples. Shorter hulls repeat their last point, which changes no convex hull, so
+    # that all fit into one array.
+    most = max(map(len, hulls), default=0)
+    even = [np.concatenate([hull, np.repeat(hull[-1:], most - len(hull), axis=0)]) for hull in hulls]
+    return np.array(even).reshape(len(hulls), most, 3)
 
 
 @dataclass(frozen=True, eq=False)
@@ -180,7 +161,6 @@ class Scanner:
         self.delay = sensor.model.delay(np.arange(sensor.model.channels * sensor.model.azimuth_count))
         self._model = sensor.model
         rays = np.arange(len(self.delay))
-        self._windows = BeamWindows(self._model)
         self.directions: Float = BeamPattern(self._model).directions(rays) @ sensor.orientation.T
         self.coarse_directions: NDArray[np.float32] = self.directions.astype(np.float32)
         self._distance = np.full(len(rays), np.inf)
@@ -197,14 +177,24 @@ class Scanner:
         """Whether no ray hits the static scene."""
         return not np.isfinite(self._distance).any()
 
-    def scan(self, traffic: MovingTraffic, users: int) -> Scan:
-        """Return the scan of a revolution with traffic; ``users`` is the number of the trajectories' road users."""
+    def scan(self, motions: Sequence[Motion], shapes: Sequence[BodySurface], hulls: Float, users: int) -> Scan:
+        """Return the scan of a revolution with traffic.
+
+        Parameters
+        ----------
+        motions, shapes : sequences of Motion and BodySurface
+            Motion and shape of each of the k road users present.
+        hulls : (k, m, 3) float64, metres
+            Points around each motion; see `hulls_of`.
+        users : int
+            Number of the trajectories' road users.
+        """
         # The static scan comes first; every road user then replaces the rays that it stops sooner. The nearest hit
         # remains, whatever the order of the road users.
         distance, intensity, chance = self._distance.copy(), self._intensity.copy(), self._chance.copy()
         instance = np.full(len(distance), STATIC_INSTANCE, dtype=np.int32)
         unoccluded = np.zeros(users, dtype=np.int64)
-        for motion, hits in self._hits(traffic):
+        for motion, hits in self._hits(motions, shapes, hulls):
             # counted before the comparison: hits of this road user in a scene without others
             unoccluded[motion.user] = self.in_range(hits.distance).sum()
             nearest = hits.distance < distance[hits.ray]
@@ -219,14 +209,16 @@ class Scanner:
         """Return which distances the sensor can measure."""
         return (distance >= self._model.min_range) & (distance <= self._model.max_range)
 
-    def _hits(self, traffic: MovingTraffic) -> Iterator[tuple[Motion, _Hits]]:
+    def _hits(
+        self, motions: Sequence[Motion], shapes: Sequence[BodySurface], hulls: Float
+    ) -> Iterator[tuple[Motion, _Hits]]:
         """Yield each road user's hits, ignoring the rest of the scene."""
-        if not traffic.motions:
+        if not motions:
             return
         # the rays towards all hulls at once; they come sorted by hull, so that each road user's rays are one slice
-        hull, ray = self._windows.rays_towards((traffic.hulls - self.sensor.xyz) @ self.sensor.orientation)
-        first = np.searchsorted(hull, np.arange(len(traffic.motions) + 1))
-        for number, (motion, shape) in enumerate(zip(traffic.motions, traffic.shapes, strict=True)):
+        hull, ray = rays_towards(self._model, (hulls - self.sensor.xyz) @ self.sensor.orientation)
+        first = np.searchsorted(hull, np.arange(len(motions) + 1))
+        for number, (motion, shape) in enumerate(zip(motions, shapes, strict=True)):
             yield motion, self._cast_at(shape, motion, ray[first[number] : first[number + 1]])
 
     def _cast_at(self, shape: BodySurface, motion: Motion, ray: Integer) -> _Hits:

@@ -27,7 +27,7 @@ from ..visibility.ray_casting import make_ray_caster
 from ..visibility.settings import Engine
 from .frame import STATIC_INSTANCE, Frame, Labels
 from .motion import Motion, moving, still
-from .scanner import BodySurface, MovingTraffic, ReflectiveSurface, Scan, Scanner, returns_by_user
+from .scanner import BodySurface, ReflectiveSurface, Scan, Scanner, hulls_of, returns_by_user
 from .sensor import MountedSensor
 from .static_scene import StaticScene
 
@@ -86,15 +86,6 @@ class Simulation:
         self._static, self._trajectories, self._shapes, self._settings = static, trajectories, shapes, settings
         self._revolution = max(1.0 / scanner.sensor.model.rotation_rate for scanner in scanners)
 
-    def part(self, sensors: Sequence[int]) -> Simulation:
-        """Return the simulation of some of the sensors, by their numbers, which shares their scanners.
-
-        Its `measure` makes the same frames of the sensors' scans as a simulation of these sensors alone: noise and
-        losses follow from the place of a sensor in the part.
-        """
-        scanners = [self.scanners[number] for number in sensors]
-        return Simulation(self._static, scanners, self._trajectories, self._shapes, self._settings)
-
     @property
     def warnings(self) -> tuple[str, ...]:
         """Warnings about the scans."""
@@ -134,9 +125,10 @@ class Simulation:
     def scans(self, snapshot: Snapshot) -> list[Scan]:
         """Return the scan of each sensor, without noise and lost returns."""
         motions = self._motions(snapshot)
-        traffic = MovingTraffic.of(motions, [self._shapes[motion.user] for motion in motions])
+        shapes = [self._shapes[motion.user] for motion in motions]
+        hulls, users = hulls_of(motions, shapes), len(self._trajectories)
         with ThreadPoolExecutor(min(len(self.scanners), self._threads)) as pool:
-            return list(pool.map(lambda scanner: scanner.scan(traffic, len(self._trajectories)), self.scanners))
+            return list(pool.map(lambda scanner: scanner.scan(motions, shapes, hulls, users), self.scanners))
 
     def _motions(self, snapshot: Snapshot) -> list[Motion]:
         rolling = self._settings.rolling_shutter

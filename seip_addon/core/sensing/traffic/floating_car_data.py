@@ -9,61 +9,22 @@ import math
 import os
 from array import array
 from collections.abc import Generator, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
-from ...base.arrays import Boolean, Float, Integer
+from ...base.arrays import Float, Integer
 from ...base.counts import counted
 from ...base.errors import SeipError
 from ...base.limits import MAP_COORDINATE, SPEED, TIME
 from ...base.progress import Progress
 from ...storage.files import digest
 from ...storage.xml_stream import Attributes, quoted, read_tags, short
-from .trajectories import RoadUser, Trajectories
+from .trajectories import LoadedTraffic, RoadUser, Trajectories
 from .vehicle_types import CAR, PERSON, VehicleType
 
 _MAX_NAMED = 5  # largest number of road users named in a message, which gives the number of the others
-
-
-@dataclass(frozen=True, eq=False)
-class FloatingCarData:
-    """Content of a file of floating car data, one road user after the other; u road users, n samples.
-
-    Parameters
-    ----------
-    names, types : tuple of str
-        Id and vehicle type of each road user; the type is "" if the file has none.
-    person : (u,) bool
-        Whether each is a person on foot.
-    first : (u + 1,) int64
-        Samples of road user i are ``first[i]`` up to ``first[i + 1]``, one or more.
-    time : (n,) float64, seconds
-        Time of each sample, strictly increasing for each road user.
-    position : (n, 3) float64, metres
-        Position of the front bumper, or of the person, in map coordinates; z is NaN if the file has none.
-    yaw : (n,) float64, radians
-        Heading counter-clockwise from +x, unwrapped.
-    speed : (n,) float64, metres per second
-        Speed at each sample.
-    elsewhere : int
-        Number of further road users in the file that are never within the bounds.
-    riders : int
-        Number of persons in vehicles, who are left out.
-    """
-
-    names: tuple[str, ...]
-    types: tuple[str, ...]
-    person: Boolean
-    first: Integer
-    time: Float
-    position: Float
-    yaw: Float
-    speed: Float
-    elsewhere: int = 0
-    riders: int = 0
 
 
 class Extent(NamedTuple):
@@ -79,31 +40,14 @@ class Extent(NamedTuple):
 
 
 def read_floating_car_data(
-    path: str | os.PathLike[str], net_offset: Float | None = None, window: Extent | None = None
-) -> Generator[Progress, None, FloatingCarData]:
+    path: str | os.PathLike[str],
+    types: Mapping[str, VehicleType],
+    origin: Float,
+    source: str,
+    net_offset: Float | None = None,
+    window: Extent | None = None,
+) -> Generator[Progress, None, LoadedTraffic]:
     """Read floating car data as XML, with or without gzip.
-
-    Parameters
-    ----------
-    net_offset : (2,) float64, metres, optional
-        Offset of the network: map = network − offset.
-    window : Extent, optional
-        Part of the file to keep in memory.
-
-    Raises
-    ------
-    SeipError
-        The file cannot be read, has other contents or is incomplete, its times decrease, or a number is invalid.
-    """
-    rows = _Rows(Path(path).name, np.zeros(2) if net_offset is None else net_offset, window or Extent())
-    yield from read_tags(path, rows.take)
-    return rows.gathered()
-
-
-def read_trajectories(
-    data: FloatingCarData, types: Mapping[str, VehicleType], origin: Float, source: str
-) -> tuple[Trajectories, tuple[str, ...]]:
-    """Return trajectories of road users with their sizes, in local axes.
 
     Parameters
     ----------
@@ -113,48 +57,26 @@ def read_trajectories(
         Map coordinates of the local origin.
     source : str
         Source of the trajectories, for messages.
+    net_offset : (2,) float64, metres, optional
+        Offset of the network: map = network − offset.
+    window : Extent, optional
+        Part of the file to keep in memory.
 
     Returns
     -------
-    trajectories : Trajectories
-        Trajectories that are not fitted to the road yet: pitch is zero, and heights are those of the file or NaN.
-    warnings : tuple of str
-        Warnings about road users without a size, and about what is left out.
+    LoadedTraffic
+        Trajectories that are not fitted to the road yet: pitch is zero, and heights are those of the file or NaN. Its
+        warnings are about road users without a size, and about persons in vehicles, who are left out.
 
     Raises
     ------
     SeipError
-        There is no road user.
+        The file cannot be read, has other contents or is incomplete, its times decrease, a number is invalid, or no
+        road user is in the window.
     """
-    if not data.names:
-        raise SeipError(
-            f"FCD of another map, or of another time: none of the {data.elsewhere} road users in {source} comes near "
-            "the scene's road; simulate on the scene's own map, without --fcd-output.geo, and name its .net.xml where "
-            "that has a netOffset"
-        )
-    sizes = [
-        types.get(name, PERSON if walks else CAR) for name, walks in zip(data.types, data.person.tolist(), strict=True)
-    ]
-    users = tuple(
-        RoadUser(name, size.category, size.length, size.width, size.height, _paint(name))
-        for name, size in zip(data.names, sizes, strict=True)
-    )
-    ahead = np.where(data.person, 0.0, [size.length / 2.0 for size in sizes])
-    ahead = np.repeat(ahead, np.diff(data.first))
-    heading = np.stack([np.cos(data.yaw), np.sin(data.yaw), np.zeros_like(data.yaw)], axis=1)
-    trajectories = Trajectories(
-        users=users,
-        origin=origin,
-        first=data.first,
-        time=data.time,
-        position=data.position - ahead[:, None] * heading - origin,
-        yaw=data.yaw,
-        pitch=np.zeros_like(data.yaw),
-        speed=data.speed,
-        source=source,
-    )
-    unknown = [name for name, kind in zip(data.names, data.types, strict=True) if kind not in types]
-    return trajectories, (*_missing_sizes(unknown, len(users)), *_left_out(data))
+    rows = _Rows(Path(path).name, np.zeros(2) if net_offset is None else net_offset, window or Extent())
+    yield from read_tags(path, rows.take)
+    return rows.gathered(types, origin, source)
 
 
 def listed(names: Sequence[str]) -> str:
@@ -267,14 +189,21 @@ class _Rows:
         for column, value in zip(self._columns, values, strict=True):
             column.append(value)
 
-    def gathered(self) -> FloatingCarData:
-        """Return the rows by road user, in the order in which these appear."""
+    def gathered(self, types: Mapping[str, VehicleType], origin: Float, source: str) -> LoadedTraffic:
+        """Return the rows as trajectories, in the order in which road users appear; see `read_floating_car_data`."""
         if not self._steps:
             raise SeipError(
                 f"{self._file} is not floating car data: it has no time steps; use the output of SUMO's --fcd-output"
             )
         self._note_riders()
         keys = [key for key in self._numbers if not (key[1] and key[0] in self._riders)]
+        if not keys:
+            elsewhere = len(self._outside.difference(self._numbers))
+            raise SeipError(
+                f"FCD of another map, or of another time: none of the {elsewhere} road users in {source} comes near "
+                "the scene's road; simulate on the scene's own map, without --fcd-output.geo, and name its .net.xml "
+                "where that has a netOffset"
+            )
         numbers = np.full(len(self._numbers), -1)
         numbers[np.array([self._numbers[key] for key in keys], dtype=np.int64)] = np.arange(len(keys))
         user = numbers[np.frombuffer(self._user, dtype=np.int64)]
@@ -282,7 +211,7 @@ class _Rows:
         user = user[order]
         time, x, y, z, angle, speed = (np.array(column, dtype=np.float64)[order] for column in self._columns)
         vehicles = {name for name, walks in keys if not walks}
-        names = tuple(f"person {name}" if walks and name in vehicles else name for name, walks in keys)
+        names = [f"person {name}" if walks and name in vehicles else name for name, walks in keys]
         twice = (np.diff(user) == 0) & (np.diff(time) <= 0)
         if twice.any():
             number = int(np.flatnonzero(twice)[0])
@@ -290,19 +219,30 @@ class _Rows:
                 f"{self._file}: road user {quoted(names[user[number]])} appears twice at {time[number]:g} s; "
                 "use the output of a single simulation"
             )
-        first = np.searchsorted(user, np.arange(len(names) + 1))
-        return FloatingCarData(
-            names=names,
-            types=tuple(self._types[self._numbers[key]] for key in keys),
-            person=np.array([walks for _, walks in keys], dtype=np.bool_),
-            first=first.astype(np.int64),
+        first = np.searchsorted(user, np.arange(len(names) + 1)).astype(np.int64)
+        yaw = unwrapped(np.radians(90.0 - angle), first)
+        kinds = [self._types[self._numbers[key]] for key in keys]
+        sizes = [types.get(kind, PERSON if walks else CAR) for kind, (_, walks) in zip(kinds, keys, strict=True)]
+        half = [0.0 if walks else size.length / 2.0 for size, (_, walks) in zip(sizes, keys, strict=True)]
+        heading = np.stack([np.cos(yaw), np.sin(yaw), np.zeros_like(yaw)], axis=1)
+        trajectories = Trajectories(
+            users=tuple(
+                RoadUser(name, size.category, size.length, size.width, size.height, _paint(name))
+                for name, size in zip(names, sizes, strict=True)
+            ),
+            origin=origin,
+            first=first,
             time=time,
-            position=np.stack([x, y, z], axis=1),
-            yaw=unwrapped(np.radians(90.0 - angle), first),
+            position=np.stack([x, y, z], axis=1) - np.repeat(half, np.diff(first))[:, None] * heading - origin,
+            yaw=yaw,
+            pitch=np.zeros_like(yaw),
             speed=speed,
-            elsewhere=len(self._outside.difference(self._numbers)),
-            riders=len(self._numbers) - len(keys),
+            source=source,
         )
+        unknown = [name for name, kind in zip(names, kinds, strict=True) if kind not in types]
+        riders = counted(len(self._numbers) - len(keys), "person in a vehicle", "persons in vehicles")
+        left_out = (f"left out: {riders}",) if len(self._numbers) > len(keys) else ()
+        return LoadedTraffic(trajectories, (*_missing_sizes(unknown, len(names)), *left_out))
 
     def _number(self, text: str, what: str, where: str, most: float) -> float:
         try:
@@ -334,8 +274,3 @@ def _missing_sizes(unknown: list[str], count: int) -> tuple[str, ...]:
         f"for vehicles {CAR.length:g} × {CAR.width:g} × {CAR.height:g} m; name their route file"
     )
     return (sentence,)
-
-
-def _left_out(data: FloatingCarData) -> tuple[str, ...]:
-    riders = counted(data.riders, "person in a vehicle", "persons in vehicles")
-    return (f"left out: {riders}",) if data.riders else ()

@@ -1,7 +1,6 @@
 """Removal of overlapping road users from simulated traffic."""
 
 from collections.abc import Generator
-from dataclasses import dataclass
 
 import numpy as np
 import shapely
@@ -11,28 +10,6 @@ from ...base.progress import Progress
 from .trajectories import Snapshot, Trajectories, some_users
 
 MIN_OVERLAP = 0.02  # square metres; smaller overlaps of two footprints are only contact
-
-
-@dataclass(frozen=True, eq=False)
-class Overlaps:
-    """Pairs of road users that overlap at some sampled instant; k pairs.
-
-    Parameters
-    ----------
-    pair : (k, 2) int64
-        Indices of road users, the smaller first.
-    area : (k,) float64, square metres
-        Largest overlap of their footprints at any of the instants.
-    time : (k,) float64, seconds
-        Time of the largest overlap.
-    """
-
-    pair: Integer
-    area: Float
-    time: Float
-
-    def __len__(self) -> int:
-        return len(self.pair)
 
 
 def footprints(trajectories: Trajectories, snapshot: Snapshot) -> Float:
@@ -47,34 +24,26 @@ def footprints(trajectories: Trajectories, snapshot: Snapshot) -> Float:
     return corners
 
 
-def find_overlaps(trajectories: Trajectories, interval: float = 0.2) -> Generator[Progress, None, Overlaps]:
+def find_overlaps(trajectories: Trajectories, interval: float = 0.2) -> Generator[Progress, None, Integer]:
     """Find road users that overlap, at instants ``interval`` seconds apart.
 
     Returns
     -------
-    Overlaps
-        Overlaps in the order of the pairs.
+    (k, 2) int64
+        Pairs of indices of road users, in ascending order, the smaller index first.
     """
     begin, end = trajectories.span
     instants = np.arange(begin, end + interval / 2.0, interval)
-    worst: dict[tuple[int, int], tuple[float, float]] = {}
+    pairs = np.zeros((0, 2), dtype=np.int64)
     for done, time in enumerate(instants.tolist()):
         snapshot = trajectories.at(time)
         polygons = shapely.polygons(footprints(trajectories, snapshot))
         one, other = shapely.STRtree(polygons).query(polygons, predicate="intersects")
         one, other = one[one < other], other[one < other]
-        area = shapely.area(shapely.intersection(polygons[one], polygons[other]))
-        deep = area > MIN_OVERLAP
-        for pair, value in zip(snapshot.user[np.stack([one, other], axis=1)][deep].tolist(), area[deep], strict=True):
-            key = (pair[0], pair[1])
-            worst[key] = max(worst.get(key, (0.0, 0.0)), (float(value), time))
+        deep = shapely.area(shapely.intersection(polygons[one], polygons[other])) > MIN_OVERLAP
+        pairs = np.unique(np.concatenate([pairs, snapshot.user[np.stack([one, other], axis=1)][deep]]), axis=0)
         yield Progress(done + 1, len(instants), "looking for collisions")
-    pairs = sorted(worst)
-    return Overlaps(
-        pair=np.array(pairs, dtype=np.int64).reshape(-1, 2),
-        area=np.array([worst[pair][0] for pair in pairs]),
-        time=np.array([worst[pair][1] for pair in pairs]),
-    )
+    return pairs
 
 
 def without_overlaps(trajectories: Trajectories) -> Generator[Progress, None, tuple[Trajectories, tuple[str, ...]]]:
@@ -87,8 +56,7 @@ def without_overlaps(trajectories: Trajectories) -> Generator[Progress, None, tu
     names : tuple of str
         Names of the road users removed.
     """
-    overlaps = yield from find_overlaps(trajectories)
-    pairs = overlaps.pair
+    pairs = yield from find_overlaps(trajectories)
     stay = np.diff(trajectories.first)
     gone: list[int] = []
     while len(pairs):

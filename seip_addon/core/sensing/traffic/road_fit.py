@@ -1,4 +1,7 @@
-"""Fit of road users to the road surface of a scene: heights, slopes, and removal where there is no road."""
+"""Fit of road users to the road surface of a scene: heights, slopes, and removal where there is no road.
+
+SUMO's pedestrians are smoothed: they jump by a metre or two at the beginning of a crossing, and turn on the spot.
+"""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -12,11 +15,12 @@ from ...base.errors import SeipError
 from ...geometry.plan import MIN_AREA, heights_over, plane_height, signed_area
 from ...site.scene_geometry import SceneGeometry, joined
 from .floating_car_data import listed, unwrapped
-from .smooth_walks import out_of_reach
 from .trajectories import LoadedTraffic, RoadUser, Trajectories
 
 WHEELBASE_SHARE = 0.6  # wheelbase as a share of a vehicle's length: its pitch is that of the road between the axles
 MAX_GAP = 2.5  # sampling intervals; if samples are farther apart, the road user was elsewhere in between
+WINDOW_SECONDS = 1.8  # seconds over which a pedestrian's position and heading are averaged
+MAX_LEAP = 4.0  # metres beyond what the speed explains; after a longer step a road user was moved elsewhere
 
 _DIGITS = {"time": 3, "position": 3, "yaw": 4, "pitch": 4, "speed": 2}
 """Decimal places of each array: a millimetre and a ten-thousandth of a radian, the precision of simulations."""
@@ -108,6 +112,23 @@ def fit_to_road(trajectories: Trajectories, geometry: SceneGeometry) -> LoadedTr
     return LoadedTraffic(_rounded(_without_gaps(fitted, user, on_road)), warnings)
 
 
+def smooth_walks(trajectories: Trajectories) -> Trajectories:
+    """Return the trajectories with pedestrians' positions in plan and headings averaged over `WINDOW_SECONDS`.
+
+    At the ends of a walk, and where a pedestrian was moved elsewhere, the window is shortened to the available samples.
+    """
+    position, yaw = trajectories.position.copy(), trajectories.yaw.copy()
+    leaps = np.flatnonzero(_out_of_reach(trajectories)) + 1
+    for user, begin, end in zip(trajectories.users, trajectories.first[:-1], trajectories.first[1:], strict=True):
+        if user.category != "pedestrian" or end - begin < 3:
+            continue
+        reach = round(WINDOW_SECONDS / 2.0 / float(np.median(np.diff(trajectories.time[begin:end]))))
+        for part in np.split(np.arange(begin, end), leaps[(begin < leaps) & (leaps < end)] - begin):
+            position[part, :2] = _averaged(position[part, :2], reach)
+            yaw[part] = _averaged(yaw[part, None], reach)[:, 0]
+    return replace(trajectories, position=position, yaw=yaw)
+
+
 def _pitch(height: Callable[[Float, Float], Float], plan: Float, z: Float, yaw: Float, length: Float) -> Float:
     """Return the slope of the road between the axles, radians; the middle replaces an axle that is off the road."""
     half = WHEELBASE_SHARE / 2.0 * length
@@ -153,7 +174,7 @@ def _without_gaps(trajectories: Trajectories, user: Integer, keep: Boolean) -> T
     user, time = user[kept], trajectories.time[kept]
     new = np.ones(len(kept), dtype=np.bool_)
     new[1:] = (np.diff(user) != 0) | (np.diff(kept) > 1) | (np.diff(time) > _longest_gap(trajectories))
-    new[1:] |= out_of_reach(trajectories)[kept[1:] - 1]
+    new[1:] |= _out_of_reach(trajectories)[kept[1:] - 1]
     begin = np.flatnonzero(new)
     end = np.append(begin[1:], len(kept))
     stays = end - begin > 1
@@ -189,3 +210,26 @@ def _visit(user: RoadUser, visit: int) -> RoadUser:
 def _rounded(trajectories: Trajectories) -> Trajectories:
     arrays = {name: np.round(getattr(trajectories, name), digits) + 0.0 for name, digits in _DIGITS.items()}
     return replace(trajectories, **arrays)
+
+
+def _out_of_reach(trajectories: Trajectories) -> Boolean:
+    """Return whether each of the n samples except the first, (n - 1,) bool, is out of reach from the one before.
+
+    Speeds up to 1.5 times those at the two samples are possible. The first sample of a road user is compared with the
+    last one of the road user before; that result has no meaning.
+    """
+    step = np.hypot(*np.diff(trajectories.position[:, :2], axis=0).T)
+    speed = np.maximum(trajectories.speed[1:], trajectories.speed[:-1])
+    leaps: Boolean = step > 1.5 * speed * np.abs(np.diff(trajectories.time)) + MAX_LEAP
+    return leaps
+
+
+def _averaged(values: Float, reach: int) -> Float:
+    """Return the mean (n, d) of each row and ``reach`` rows on either side, or fewer where one side has fewer."""
+    count = len(values)
+    number = np.arange(count)
+    reach_here = np.minimum(np.minimum(number, count - 1 - number), reach)
+    sums = np.concatenate([np.zeros((1, values.shape[1])), np.cumsum(values - values[0], axis=0)])
+    total = sums[number + reach_here + 1] - sums[number - reach_here]
+    mean: Float = values[0] + total / (2 * reach_here + 1)[:, None]
+    return mean

@@ -15,8 +15,6 @@ MATCH_RADIUS = 1.0  # metres in plan within which two vehicles are at the same p
 MAX_OVERLAP = 0.5
 """Share of the vehicles above which two runs are treated as copies. Independent runs have queues in the same places."""
 
-MOST_NAMED = 6  # largest number of pairs of runs that a message lists; for more it gives the range and the closest pair
-
 _INTERVAL = 1.0
 _SAME_TIME = 1e-3
 
@@ -92,14 +90,14 @@ def _near(xy: Float, others: Float) -> int:
 
 
 def require_independent(pairs: Iterable[tuple[VehiclePositions, VehiclePositions]]) -> str:
-    """Return a message on the overlap of the runs of each pair.
+    """Return a message on the largest overlap of the runs of a pair.
 
     Raises
     ------
     SeipError
         A pair overlaps by more than `MAX_OVERLAP`.
     """
-    messages, shares = [], []
+    known = [(0.0, "none")]
     for one, other in pairs:
         share = overlap_of(one, other)
         if share is not None and share > MAX_OVERLAP:
@@ -108,11 +106,9 @@ def require_independent(pairs: Iterable[tuple[VehiclePositions, VehiclePositions
                 f"within {MATCH_RADIUS:g} m of one of the other at the same instant, and independent runs must be "
                 f"below {MAX_OVERLAP:.0%}: use runs that were simulated with different demand and different seeds"
             )
-        messages.append(f"{one.name} and {other.name} {'unknown' if share is None else format(share, '.0%')}")
-        shares.append(-1.0 if share is None else share)
-    if len(messages) > MOST_NAMED:
-        known = [share for share in shares if share >= 0.0] or [0.0]
-        closest = messages[int(np.argmax(shares))]
-        messages = [f"{min(known):.0%} to {max(known):.0%} in {len(messages)} pairs, most for {closest}"]
-    measure = f"vehicles of one run within {MATCH_RADIUS:g} m of one of another at the same instant"
-    return f"runs of traffic are independent (below {MAX_OVERLAP:.0%}): {measure}: {', '.join(messages)}"
+        known += [] if share is None else [(share, f"{one.name} and {other.name}")]
+    most, names = max(known)
+    return (
+        f"runs of traffic are independent (below {MAX_OVERLAP:.0%}): at most {most:.0%} of the vehicles of one run are "
+        f"within {MATCH_RADIUS:g} m of one of another at the same instant ({names})"
+    )

@@ -12,7 +12,6 @@ from ...site.scene_geometry import SceneGeometry, joined
 from .road_fit import ROAD_TOLERANCE, RoadSurface
 from .trajectories import Trajectories
 
-MAX_REGION_DISTANCE = 500.0  # metres from the region beyond which traffic belongs to another site
 MIN_ON_ROAD = 0.98  # share of vehicle positions on the road below which traffic belongs to another site
 MAX_SAMPLES = 2_000  # largest number of samples used to recognise traffic of another site
 
@@ -23,16 +22,9 @@ def load_trajectories(path: Path, geometry: SceneGeometry) -> Trajectories:
     Raises
     ------
     SeipError
-        The file cannot be read, no road user in it comes near, or it is traffic of another site.
+        The file cannot be read, or it is traffic of another site.
     """
     trajectories = Trajectories.load(path).moved_to(geometry.origin)
-    left, bottom, right, top = geometry.region.bounds
-    low, high = np.array([left, bottom]) - MAX_REGION_DISTANCE, np.array([right, top]) + MAX_REGION_DISTANCE
-    plan = trajectories.position[:, :2]
-    if not ((plan >= low) & (plan <= high)).all(axis=1).any():
-        raise SeipError(
-            f"{path} is traffic of another place, far from this scene: name traffic that was made for its map"
-        )
     require_own_traffic(trajectories, geometry, str(path))
     return trajectories
 
@@ -52,7 +44,7 @@ def require_own_traffic(trajectories: Trajectories, geometry: SceneGeometry, nam
     SeipError
         Too many vehicles are off the road: the traffic belongs to another site, or the scene has changed.
     """
-    share = share_on_road(trajectories, geometry)
+    share = _share_on_road(trajectories, geometry)
     if share < MIN_ON_ROAD:
         raise SeipError(
             f"traffic of another site: {1 - share:.0%} of the vehicle positions of {name} are off the road of this "
@@ -60,21 +52,11 @@ def require_own_traffic(trajectories: Trajectories, geometry: SceneGeometry, nam
         )
 
 
-def share_on_road(local: Trajectories, geometry: SceneGeometry) -> float:
-    """Return the share of vehicle samples that are on the road of the scene, 0 to 1.
+def _share_on_road(local: Trajectories, geometry: SceneGeometry) -> float:
+    """Return the share of vehicle samples that are on the road; 1 without vehicles, 0 if all are elsewhere.
 
     Samples are those near the region of interest or, if no vehicle comes near it, those within the extent of the roads.
     A sample within `ROAD_TOLERANCE` of the road, in plan and in height, is on it.
-
-    Parameters
-    ----------
-    local : Trajectories
-        Trajectories in the local axes of the scene.
-
-    Returns
-    -------
-    float
-        Share among at most `MAX_SAMPLES` evenly spread samples; 1 without vehicles, and 0 if all of them are elsewhere.
     """
     user = np.repeat(np.arange(len(local)), np.diff(local.first))
     drives = np.array([each.category != "pedestrian" for each in local.users], dtype=np.bool_)[user]

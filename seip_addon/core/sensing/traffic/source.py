@@ -16,7 +16,7 @@ from ...base.limits import MAP_COORDINATE
 from ...base.progress import Progress
 from ...site.scene_geometry import SceneGeometry, joined
 from ...storage.xml_stream import Attributes, read_tags
-from .floating_car_data import Extent, read_floating_car_data, read_trajectories
+from .floating_car_data import Extent, read_floating_car_data
 from .road_fit import fit_to_road
 from .site_traffic import load_trajectories
 from .trajectories import CATEGORIES, LoadedTraffic, Trajectories
@@ -90,9 +90,8 @@ def read_sumo(
     offset = (
         None if files.net is None else read_net_offset(files.net) + np.array(geometry.geo_reference.header_offset[:2])
     )
-    data = yield from read_floating_car_data(files.path, offset, window)
     types = yield from read_vehicle_types(files.routes)
-    return LoadedTraffic(*read_trajectories(data, types, geometry.origin, source))
+    return (yield from read_floating_car_data(files.path, types, geometry.origin, source, offset, window))
 
 
 def road_bounds(geometry: SceneGeometry, margin: float) -> tuple[float, float, float, float]:

@@ -20,8 +20,8 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from ...base.arrays import Boolean, Float, Integer, concatenated_ranges
-from ..lidar.azimuth_steps import steps_in_arcs
+from ...base.arrays import Boolean, Float, Integer
+from ..lidar.beam_windows import channels_between, steps_in_arcs
 from ..lidar.model import LidarModel
 from .near_surfaces import NearSurfaces
 from .settings import VisibilitySettings
@@ -122,7 +122,9 @@ def near_rays(model: LidarModel, origin: Float, yaw: float, surfaces: NearSurfac
     x, y, _ = (surfaces.xyz[target] - origin).T
     bottom, top = surfaces.low[target] - origin[2], surfaces.high[target] - origin[2]
     patch_distance, radius = np.hypot(x, y), surfaces.radius
-    patch, channel = _channels_at(model, patch_distance, radius, bottom, top)
+    patch, channel = channels_between(
+        model, bottom, top, np.maximum(patch_distance - radius, 0.0), patch_distance + radius
+    )
     slope, distance = np.tan(model.elevations)[channel], patch_distance[patch]
     begin, end = _between_heights(slope, bottom[patch], top[patch])
     # fmax and fmin ignore NaN, the value of level beams within the heights: for these only the cylinder limits r
@@ -141,24 +143,6 @@ def near_rays(model: LidarModel, origin: Float, yaw: float, surfaces: NearSurfac
         azimuth, half_width[some], model.azimuth_step, model.azimuth_count, all_round=model.all_round
     )
     return NearRays(target[patch[arc]], channel[arc], first, width)
-
-
-def _channels_at(
-    model: LidarModel, distance: Float, radius: float, bottom: Float, top: Float
-) -> tuple[Integer, Integer]:
-    """Return pairs of patches and of channels that are at the patch's heights somewhere in the cylinder."""
-    # The slopes from the sensor to the patch's edges, each at the side of the cylinder where it is most extreme.
-    # Channels between these slopes are one slice of all channels sorted by elevation.
-    near, far = np.maximum(distance - radius, 0.0), distance + radius
-    with np.errstate(divide="ignore"):
-        least = bottom / np.where(bottom < 0, near, far)
-        most = top / np.where(top > 0, near, far)
-    order = np.argsort(model.elevations, kind="stable")
-    slopes = np.tan(model.elevations[order])
-    low = np.searchsorted(slopes, least)
-    count = np.searchsorted(slopes, most, side="right") - low
-    count = np.where(near <= model.max_range, np.maximum(count, 0), 0)
-    return np.repeat(np.arange(len(count)), count), order[concatenated_ranges(low, count)]
 
 
 def _between_heights(slope: Float, bottom: Float, top: Float) -> tuple[Float, Float]:

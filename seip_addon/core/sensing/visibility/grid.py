@@ -145,42 +145,6 @@ def visibility_key(site: Site, models: Mapping[str, LidarModel], settings: Visib
     return digest(*inputs)
 
 
-class Checkpoint:
-    """Finished rows of an incomplete grid, in a file next to that of the grid.
-
-    Parameters
-    ----------
-    path : path
-        File of the grid.
-    key : str
-        Key of the grid; a file with another one is ignored.
-    """
-
-    def __init__(self, path: Path, key: str) -> None:
-        self._path, self._key = path.with_name(f"{path.stem}.part.npz"), key
-
-    def restore(self, packed: NDArray[np.uint8], rays: Integer) -> Integer:
-        """Fill in the finished rows (c, ceil(t / 8)) and their numbers of rays (c,); return the poses of the others."""
-        left = np.arange(len(packed))
-        try:
-            with PART.reading(self._path) as (header, arrays):
-                poses = arrays["poses"]
-                if header["key"] != self._key or arrays["packed"].shape != (len(poses), packed.shape[1]):
-                    return left
-                packed[poses], rays[poses] = arrays["packed"], arrays["rays"]
-        except SeipError:  # there is none
-            return left
-        return np.setdiff1d(left, poses)
-
-    def save(self, poses: Integer, packed: NDArray[np.uint8], rays: Integer) -> None:
-        """Write the rows of finished poses."""
-        PART.save(self._path, {"key": self._key}, {"poses": poses, "packed": packed[poses], "rays": rays[poses]})
-
-    def remove(self) -> None:
-        """Remove the file once the grid is complete."""
-        self._path.unlink(missing_ok=True)
-
-
 def seen_from(
     model: VisibilityModel, candidates: Candidates, models: Mapping[str, LidarModel], pose: int
 ) -> tuple[Boolean, int]:
@@ -197,7 +161,7 @@ def compute_visibility(
     settings: VisibilitySettings,
     engine: Engine = "auto",
     threads: int | None = None,
-    checkpoint: Checkpoint | None = None,
+    part: Path | None = None,
 ) -> Generator[Progress, None, VisibilityGrid]:
     """Compute the targets that each candidate pose sees, casting only rays that can affect the grid.
 
@@ -209,8 +173,8 @@ def compute_visibility(
         Ray-casting engine.
     threads : int, optional
         Maximum number of threads; by default the number that the ray caster can use.
-    checkpoint : Checkpoint, optional
-        Rows of an earlier computation that was ended; the rows of this one are kept there until it is complete.
+    part : path, optional
+        File with the finished rows of an earlier computation that was ended; those of this one are kept there.
 
     Yields
     ------
@@ -235,7 +199,8 @@ def compute_visibility(
     packed = np.zeros((len(candidates), (len(site.targets) + 7) // 8), dtype=np.uint8)
     rays = np.zeros(len(candidates), dtype=np.int64)
 
-    left = np.arange(len(candidates)) if checkpoint is None else checkpoint.restore(packed, rays)
+    key, shape = visibility_key(site, used, settings, name), (len(candidates), len(site.targets))
+    left = np.arange(len(candidates)) if part is None else _restored(part, key, packed, rays)
     finished = np.ones(len(candidates), dtype=bool)
     finished[left] = False
 
@@ -245,32 +210,51 @@ def compute_visibility(
         finished[pose] = True
 
     steps = each_in_threads(compute, left.tolist(), min(caster.threads, threads or caster.threads), "visibility")
-    yield from steps if checkpoint is None else _kept(steps, checkpoint, finished, packed, rays)
+    yield from steps if part is None else _kept(steps, part, key, finished, packed, rays)
     origin = {"engine": name, "sensors": list(used), "rays_of_full_scan": _rays_of_full_scan(site, used)}
     parameters = {**asdict(settings), **origin, "rays_cast": int(rays.sum())}
-    key, shape = visibility_key(site, used, settings, name), (len(candidates), len(site.targets))
     return VisibilityGrid(packed, shape, key, parameters)
+
+
+def _restored(part: Path, key: str, packed: NDArray[np.uint8], rays: Integer) -> Integer:
+    """Fill in finished rows (c, ceil(t / 8)) and their numbers of rays (c,); return the poses of the others."""
+    left = np.arange(len(packed))
+    try:
+        with PART.reading(part) as (header, arrays):
+            poses = arrays["poses"]
+            if header["key"] != key or arrays["packed"].shape != (len(poses), packed.shape[1]):
+                return left
+            packed[poses], rays[poses] = arrays["packed"], arrays["rays"]
+    except SeipError:  # there is none
+        return left
+    return np.setdiff1d(left, poses)
 
 
 def _kept(
     steps: Generator[Progress, None, None],
-    checkpoint: Checkpoint,
+    part: Path,
+    key: str,
     finished: Boolean,
     packed: NDArray[np.uint8],
     rays: Integer,
 ) -> Generator[Progress, None, None]:
     """Take the steps of a computation, and write what is finished from time to time and where it is ended."""
     written = np.count_nonzero(finished)
+
+    def save() -> int:
+        poses = np.flatnonzero(finished)
+        PART.save(part, {"key": key}, {"poses": poses, "packed": packed[poses], "rays": rays[poses]})
+        return len(poses)
+
     with closing(steps):
         try:
             for step in steps:
                 yield step
                 if np.count_nonzero(finished) >= written + KEPT:
-                    written = np.count_nonzero(finished)
-                    checkpoint.save(np.flatnonzero(finished), packed, rays)
+                    written = save()
         finally:
             if not finished.all() and np.count_nonzero(finished) > written:
-                checkpoint.save(np.flatnonzero(finished), packed, rays)
+                save()
 
 
 def stored_visibility(
@@ -289,10 +273,10 @@ def stored_visibility(
     if stored is not None:
         yield Progress(len(site.candidates), len(site.candidates), "visibility, from an earlier run")
         return stored
-    checkpoint = Checkpoint(path, visibility_key(site, models, settings, engine_name(engine)))
-    grid = yield from compute_visibility(site, models, settings, engine, threads, checkpoint)
+    part = path.with_name(f"{path.stem}.part.npz")
+    grid = yield from compute_visibility(site, models, settings, engine, threads, part)
     grid.save(path)
-    checkpoint.remove()
+    part.unlink(missing_ok=True)
     return grid
 
 

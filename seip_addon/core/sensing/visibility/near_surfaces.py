@@ -55,13 +55,8 @@ class Cuts:
 
     def holds(self, points: Float, margin: float) -> Boolean:
         """Return which points (k, 3) lie on their triangle, within a margin in metres; (k,) bool."""
-        # near the plane, and for each side not farther outside than the margin; `outward` has the length of the edge
-        there: Boolean = np.abs(((points - self.corners[:, 0]) * self.normal).sum(axis=1)) <= margin
-        for side in range(3):
-            edge = self.corners[:, (side + 1) % 3] - self.corners[:, side]
-            outward = np.cross(edge, self.normal)
-            there &= ((points - self.corners[:, side]) * outward).sum(axis=1) <= margin * np.linalg.norm(edge, axis=1)
-        return there
+        near: Boolean = np.abs(((points - self.corners[:, 0]) * self.normal).sum(axis=1)) <= margin
+        return near & _within_sides(points, self.corners, self.normal, margin)
 
     def heights(self, tolerance: float) -> tuple[Float, Float]:
         """Return the heights (k,) between which disc and triangle meet; low > high if they do not."""
@@ -189,9 +184,16 @@ def _cut(corners: Float, centre: Float, target: Integer, ball: float, reflectivi
     above = ((centre - corners[:, 0]) * normal).sum(axis=1)
     disc = np.sqrt(np.maximum(ball**2 - above**2, 0.0))
     meets = (length > 0) & (np.abs(above) < ball)
-    for side in range(3):
-        edge = corners[:, (side + 1) % 3] - corners[:, side]
-        outward = np.cross(edge, normal)
-        meets &= ((centre - corners[:, side]) * outward).sum(axis=1) <= disc * np.linalg.norm(edge, axis=1)
+    meets &= _within_sides(centre, corners, normal, disc)
     middle = centre - above[:, None] * normal
     return Cuts(*(part[meets] for part in (target, corners, normal, middle, disc, reflectivity)))
+
+
+def _within_sides(points: Float, corners: Float, normal: Float, margin: Float | float) -> Boolean:
+    """Return which points (k, 3) are at no side of their triangle farther outside, in its plane, than a margin."""
+    within = np.ones(len(points), dtype=bool)
+    for side in range(3):
+        edge = corners[:, (side + 1) % 3] - corners[:, side]
+        outward = np.cross(edge, normal)  # as long as the edge
+        within &= ((points - corners[:, side]) * outward).sum(axis=1) <= margin * np.linalg.norm(edge, axis=1)
+    return within

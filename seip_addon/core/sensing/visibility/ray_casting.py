@@ -45,13 +45,8 @@ class RayCaster(Protocol):
         Useful number of threads that cast at once.
     """
 
-    @property
-    def triangles(self) -> Float:
-        """The triangles that hits index."""
-
-    @property
-    def threads(self) -> int:
-        """Useful number of threads that cast at once."""
+    triangles: Float
+    threads: int
 
     def cast(self, origin: Float, directions: Float, max_range: float) -> tuple[Float, Integer]:
         """Cast rays from one point, or each from a point of its own.

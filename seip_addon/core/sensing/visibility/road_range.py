@@ -55,8 +55,6 @@ def upright_range(model: LidarModel, reflected: float, settings: VisibilitySetti
     reflected : float, 0 to 1
         Reflectivity of the body times the cosine of the angle of incidence; see `returns.bodies.PANELS`.
     """
-    if not isinstance(model.law, RangeEquation):
-        return model.max_range
     return min(model.law.reach(reflected, settings.detection), model.max_range)
 
 

@@ -15,8 +15,7 @@ from ...base.progress import Progress
 from ...programs.sumo_programs import NETWORK_SUFFIX, Sumo, find_sumo, run
 from ...sensing.traffic.floating_car_data import Extent
 from ...sensing.traffic.overlaps import without_overlaps
-from ...sensing.traffic.road_fit import fit_to_road
-from ...sensing.traffic.smooth_walks import smooth_walks
+from ...sensing.traffic.road_fit import fit_to_road, smooth_walks
 from ...sensing.traffic.source import ROAD_MARGIN, TrafficFiles, read_sumo, road_bounds
 from ...sensing.traffic.trajectories import Trajectories
 from ...site.scene_geometry import SceneGeometry

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from seip_addon.core.sensing.lidar.azimuth_steps import steps_in_arcs
+from seip_addon.core.sensing.lidar.beam_windows import steps_in_arcs
 from seip_addon.core.sensing.lidar.catalogue import load_catalogue
 from seip_addon.core.sensing.lidar.rings import beam_rings
 

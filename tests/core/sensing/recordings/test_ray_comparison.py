@@ -53,7 +53,6 @@ def test_added_boxes_are_found_with_place_and_size():
     )
     found, triangles = comparisons(PLAN, (*PLAN, *added))
     changes = new_objects(found, no_road)
-    assert [change.name for change in changes] == [f"Found {number + 1}" for number in range(len(changes))]
     assert [change.rays for change in changes] == sorted((change.rays for change in changes), reverse=True)
     outlines = [shapely.MultiPoint(mesh.triangles.reshape(-1, 3)[:, :2]).convex_hull for mesh in added]
     shown = [[change for change in changes if shapely.Point(change.box[:2]).within(outline)] for outline in outlines]

@@ -20,7 +20,7 @@ from seip_addon.core.base.progress import finish
 from seip_addon.core.geometry.orientation import rotations
 from seip_addon.core.sensing.lidar.carla_dropoff import CarlaDropoff
 from seip_addon.core.sensing.lidar.catalogue import load_catalogue
-from seip_addon.core.sensing.scans.beam_culling import BeamWindows
+from seip_addon.core.sensing.scans.beam_culling import rays_towards
 from seip_addon.core.sensing.scans.frame import STATIC_INSTANCE, Frame, Labels
 from seip_addon.core.sensing.scans.sensor import MountedSensor, level_orientation
 from seip_addon.core.sensing.scans.simulation import ScanSettings, Simulation, prepare
@@ -213,7 +213,7 @@ def test_windows_hold_every_ray_through_a_hull(seed) -> None:
             @ rotations(np.array([random.uniform(-3, 3)]), np.zeros(1))[0]
         )
     hulls = np.stack([box.reshape(-1, 3) for box in boxes])
-    hull, ray = BeamWindows(model).rays_towards(hulls)
+    hull, ray = rays_towards(model, hulls)
     sensor = MountedSensor("S", model, np.zeros(3), np.eye(3))
     directions = simulation(make_static(), [sensor], parked()).scanners[0].directions
     for number, box in enumerate(boxes):

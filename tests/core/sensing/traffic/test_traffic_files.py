@@ -9,11 +9,7 @@ import pytest
 
 from seip_addon.core.base.errors import SeipError
 from seip_addon.core.base.progress import finish
-from seip_addon.core.sensing.traffic.floating_car_data import (
-    Extent,
-    read_floating_car_data,
-    read_trajectories,
-)
+from seip_addon.core.sensing.traffic.floating_car_data import Extent, read_floating_car_data
 from seip_addon.core.sensing.traffic.source import read_net_offset
 from seip_addon.core.sensing.traffic.trajectories import SAMPLED, Trajectories
 from seip_addon.core.sensing.traffic.vehicle_types import BUILT_IN, CAR, VehicleType, read_vehicle_types
@@ -27,8 +23,9 @@ def written(folder, name, text):
     return path
 
 
-def read(path, **more):
-    return finish(read_floating_car_data(path, **more))
+def read(path, types=BUILT_IN, origin=(0.0, 0.0, 0.0), **more):
+    found = finish(read_floating_car_data(path, types, np.array(origin), path.name, **more))
+    return found.trajectories, found.warnings
 
 
 def one(row, times=(0.0, 0.1)):
@@ -45,13 +42,13 @@ def one(row, times=(0.0, 0.1)):
     ],
 )
 def test_every_form_says_the_same(tmp_path, name, text):
-    data = read(written(tmp_path, name, text), net_offset=np.array([10.0, 20.0]))
-    assert data.names == ("a", "w", "b")
-    assert data.types == ("long", "DEFAULT_PEDTYPE", "unheard")
-    assert data.person.tolist() == [False, True, False]
+    data, _ = read(written(tmp_path, name, text), net_offset=np.array([10.0, 20.0]))
+    assert [(user.name, user.category) for user in data.users] == [("a", "car"), ("w", "pedestrian"), ("b", "car")]
     assert data.first.tolist() == [0, 2, 3, 5]
     assert data.time.tolist() == [0.0, 0.2, 0.0, 0.2, 0.4]
-    np.testing.assert_array_equal(data.position[:, :2], [[100, 30], [102, 30], [10, 10], [0, 0], [0, 1]])
+    ahead = np.array([2.5, 2.5, 0, 2.5, 2.5])[:, None] * np.column_stack([np.cos(data.yaw), np.sin(data.yaw)])
+    bumper = [[100, 30], [102, 30], [10, 10], [0, 0], [0, 1]]
+    np.testing.assert_allclose(data.position[:, :2] + ahead, bumper, atol=1e-12)
     np.testing.assert_array_equal(data.position[:, 2], [1.5, 1.5, np.nan, 0, 0])
     np.testing.assert_allclose(np.degrees(data.yaw), [0, 0, 90, -260, -280], atol=1e-12)
     assert data.speed.tolist() == [10, 10, 1.3, 5, 5]
@@ -65,18 +62,15 @@ def test_riders_and_containers_are_left_out(tmp_path):
         f'speed="1"/><container id="box" x="1" y="1" angle="0" speed="0"/></timestep>'
         for k in range(3)
     )
-    data = read(written(tmp_path, "f.xml", f"<fcd-export>{steps}</fcd-export>"))
-    assert (data.names, data.person.tolist()) == (("bus", "walker"), [False, True])
-    assert data.riders == 1
-    assert data.position[:, 0].tolist() == [0.5, 9.5, 18.5, 0, 1, 2]
-    _, warnings = read_trajectories(data, {}, np.zeros(3), "by hand")
+    data, warnings = read(written(tmp_path, "f.xml", f"<fcd-export>{steps}</fcd-export>"))
+    assert [(user.name, user.category) for user in data.users] == [("bus", "car"), ("walker", "pedestrian")]
+    assert data.position[:, 0].tolist() == [-2, 7, 16, 0, 1, 2]
     assert any("1 person in a vehicle" in one for one in warnings)
 
 
 def test_the_middle_is_half_a_length_behind_the_bumper(tmp_path):
-    data = read(written(tmp_path, "f.xml", FCD))
     types = finish(read_vehicle_types([written(tmp_path, "r.xml", ROUTES)]))
-    got, warnings = read_trajectories(data, types, np.array([1.0, 2.0, 0.5]), "by hand")
+    got, warnings = read(written(tmp_path, "f.xml", FCD), types, (1.0, 2.0, 0.5))
     bus, walker, unknown = got.users
     assert (bus.category, bus.length, bus.width, bus.height) == ("bus", 10.0, 2.5, 3.0)
     assert walker.category == "pedestrian"
@@ -100,9 +94,8 @@ def test_types_fall_back_to_what_sumo_assumes(tmp_path):
 
 def test_only_the_window_is_kept(tmp_path):
     path = written(tmp_path, "f.xml", FCD)
-    data = read(path, window=Extent(begin=0.1, bounds=(0.0, 0.0, 50.0, 50.0)))
-    assert data.names == ("b",)
-    assert data.elsewhere == 1  # a, at 112 m; the walker was there before
+    data, _ = read(path, window=Extent(begin=0.1, bounds=(0.0, 0.0, 50.0, 50.0)))
+    assert [user.name for user in data.users] == ["b"]  # a is at 112 m; the walker was there before
     assert data.time.tolist() == [0.2, 0.4]
 
 
@@ -188,6 +181,5 @@ def test_trajectories_whose_numbers_are_wrong_are_refused(tmp_path, changes):
 
 
 def test_nobody_near_the_scene_is_refused(tmp_path):
-    data = read(written(tmp_path, "f.xml", FCD), window=Extent(bounds=(1e6, 1e6, 2e6, 2e6)))
-    with pytest.raises(SeipError, match=r"FCD of another map.* none of the 3 road users in f comes near"):
-        read_trajectories(data, BUILT_IN, np.zeros(3), "f")
+    with pytest.raises(SeipError, match=r"FCD of another map.* none of the 3 road users in f.xml comes near"):
+        read(written(tmp_path, "f.xml", FCD), window=Extent(bounds=(1e6, 1e6, 2e6, 2e6)))

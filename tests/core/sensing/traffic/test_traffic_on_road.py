@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 from seip_addon.core.base.errors import SeipError
 from seip_addon.core.base.progress import finish
 from seip_addon.core.sensing.traffic.overlaps import find_overlaps, footprints, without_overlaps
-from seip_addon.core.sensing.traffic.road_fit import ROAD_TOLERANCE, fit_to_road
-from seip_addon.core.sensing.traffic.smooth_walks import smooth_walks
+from seip_addon.core.sensing.traffic.road_fit import ROAD_TOLERANCE, fit_to_road, smooth_walks
 from seip_addon.core.sensing.traffic.trajectories import RoadUser, Trajectories
 from seip_addon.core.site.scene_geometry import Mesh, SceneGeometry
 from tests.oracles.random_cases import cases
@@ -161,10 +160,7 @@ def test_footprints_and_overlaps_by_hand():
     np.testing.assert_allclose(
         footprints(crossing, crossing.at(0.0))[0], [[-8, 0.9], [-12, 0.9], [-12, -0.9], [-8, -0.9]], atol=1e-12
     )
-    found = finish(find_overlaps(crossing))
-    assert found.pair.tolist() == [[0, 1]]
-    assert found.area[0] == pytest.approx(1.8 * 1.8)
-    assert found.time[0] == pytest.approx(5.0, abs=0.6)
+    assert finish(find_overlaps(crossing)).tolist() == [[0, 1]]
     apart, names = finish(without_overlaps(crossing))
     assert names == ("car",)
     assert [user.name for user in apart.users] == ["across", "beside"]

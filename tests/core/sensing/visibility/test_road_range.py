@@ -30,21 +30,20 @@ def short_sighted(at_10):
     return {"type1": replace(CATALOGUE["type1"], law=law)}
 
 
-def test_range_on_a_road_is_that_of_the_law_within_the_longest_range():
+@pytest.mark.parametrize(
+    ("reach", "reflected"),
+    [
+        (lambda model: road_range(model, 0.17, 5.4, SIGHT), lambda far: 0.17 * 5.4 / far),
+        (lambda model: upright_range(model, 0.283, SIGHT), lambda _: 0.283),
+    ],
+    ids=["road", "upright body"],
+)
+def test_range_is_that_of_the_law_within_the_longest_range(reach, reflected):
     model = short_sighted(40.0)["type1"]
-    far = road_range(model, 0.17, 5.4, SIGHT)
-    hit, reflected = np.array([far]), np.array([0.17 * 5.4 / far])
-    assert model.law.chance(hit, reflected)[0] == pytest.approx(0.9, abs=1e-6)
-    assert road_range(replace(model, max_range=12.0), 0.17, 5.4, SIGHT) == 12.0
-    assert road_range(CATALOGUE["type1"], 0.17, 5.4, SIGHT) == CATALOGUE["type1"].max_range
-
-
-def test_range_on_an_upright_body_is_that_of_the_law_within_the_longest_range():
-    model = short_sighted(40.0)["type1"]
-    far = upright_range(model, 0.283, SIGHT)
-    assert model.law.chance(np.array([far]), np.array([0.283]))[0] == pytest.approx(0.9, abs=1e-6)
-    assert upright_range(replace(model, max_range=12.0), 0.283, SIGHT) == 12.0
-    assert upright_range(CATALOGUE["type1"], 0.283, SIGHT) == CATALOGUE["type1"].max_range
+    far = reach(model)
+    assert model.law.chance(np.array([far]), np.array([reflected(far)]))[0] == pytest.approx(0.9, abs=1e-6)
+    assert reach(replace(model, max_range=12.0)) == 12.0
+    assert reach(CATALOGUE["type1"]) == CATALOGUE["type1"].max_range
 
 
 def test_warnings_say_which_share_lies_beyond_every_candidate():

@@ -11,7 +11,7 @@ import pytest
 
 from seip_addon.core.base.errors import SeipError
 from seip_addon.core.base.progress import finish
-from seip_addon.core.sensing.traffic.floating_car_data import Extent, read_floating_car_data, read_trajectories
+from seip_addon.core.sensing.traffic.floating_car_data import Extent, read_floating_car_data
 from seip_addon.core.sensing.traffic.vehicle_types import read_vehicle_types
 from seip_addon.core.world.traffic_simulation import simulation as sumo
 from seip_addon.core.world.traffic_simulation.demand import VEHICLE_SHARES, Demand, write_routes
@@ -159,8 +159,7 @@ def test_town05_is_cut_to_the_scene(tmp_path):
     streets = read_network(files.net)
     assert 10 <= len(streets.edges) <= 60
     assert len(streets.arms) >= 4
-    data = finish(read_floating_car_data(files.path, window=Extent(begin=20.0)))
     types = finish(read_vehicle_types(files.routes))
-    trajectories, warnings = read_trajectories(data, types, np.zeros(3), "Town05")
-    assert len(trajectories) > 20
-    assert not warnings
+    read = finish(read_floating_car_data(files.path, types, np.zeros(3), "Town05", window=Extent(begin=20.0)))
+    assert len(read.trajectories) > 20
+    assert not read.warnings

@@ -4,10 +4,10 @@ from dataclasses import replace
 
 from headless.detection import detector as detector_module
 from headless.detection.detector import Detector
+from headless.detection.inference import REACH, sparse_output
 from headless.detection.network import OUTPUT_STRIDE
 from headless.detection.pillars import PillarGrid, fill_pillars
 from headless.detection.settings import NetworkSettings
-from headless.detection.sparse_inference import REACH, sparse_output
 
 import numpy as np
 import pytest
@@ -76,7 +76,7 @@ def test_near_returns_the_output_is_that_of_dense_convolutions_and_elsewhere_tha
         returns = cloud(0, points)
         within = returns[GRID.holds(returns)]
         pillars = pillars_of(detector, within)
-        found = sparse_output(detector, pillars, GRID.rows, GRID.columns, GRID.pillar)
+        found = sparse_output(detector, pillars, GRID)
         dense = dense_output(detector, pillars)
         assert found.shape == dense.shape
         # What a cloud of one return gives is no object: the encoder leaves it out.

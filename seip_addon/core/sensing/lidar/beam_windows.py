@@ -1,4 +1,4 @@
-"""Azimuth steps of channels within arcs."""
+"""Windows of beams: the channels within heights, and their azimuth steps within arcs."""
 
 from __future__ import annotations
 
@@ -6,7 +6,36 @@ import math
 
 import numpy as np
 
-from ...base.arrays import Float, Integer
+from ...base.arrays import Float, Integer, concatenated_ranges
+from .model import LidarModel
+
+
+def channels_between(model: LidarModel, bottom: Float, top: Float, near: Float, far: Float) -> tuple[Integer, Integer]:
+    """Find the channels that are between two heights somewhere over some distances.
+
+    Parameters
+    ----------
+    bottom, top : (k,) float64, metres
+        Heights above the sensor.
+    near, far : (k,) float64, metres
+        Smallest and largest distance in plan; nothing is found beyond the range of the model.
+
+    Returns
+    -------
+    item, channel : (n,) int64
+        Pairs of an item, ascending, and a channel.
+    """
+    # The slope to an edge of a given height is most extreme at the near or at the far side, by the sign of the height.
+    # In order of slope, the channels between the two are one slice, found by bisection.
+    with np.errstate(divide="ignore"):  # at distance zero everything is straight above or below
+        least = bottom / np.where(bottom < 0, near, far)
+        most = top / np.where(top > 0, near, far)
+    order = np.argsort(model.elevations, kind="stable")
+    slopes = np.tan(model.elevations[order])
+    low = np.searchsorted(slopes, least)
+    count = np.maximum(np.searchsorted(slopes, most, side="right") - low, 0)
+    count[near > model.max_range] = 0
+    return np.repeat(np.arange(len(count)), count), order[concatenated_ranges(low, count)]
 
 
 def steps_in_arcs(
