@@ -79,11 +79,7 @@ def search_overlay(layout: Layout, found: Progress) -> Overlay:
     block = Block("Searching", (Entry(f"best so far: {value}", (COLOUR,)),))
     names = [layout.models[key].short_name for key in candidates.sensor[poses]]
     labels: list[Label] = list(zip(names, map(tuple, eyes.tolist()), strict=True))
-
-    def legend(_scene: bpy.types.Scene) -> Block:
-        return block
-
-    return Overlay(layers, legend, labels=lambda _scene: labels)
+    return Overlay(layers, lambda _scene: block, labels=lambda _scene: labels)
 
 
 class SEIP_OT_compare_scene(ForReadyScene, LongWork, bpy.types.Operator):

@@ -1,5 +1,6 @@
 """Folders of results: a command that ends in an error leaves none behind that it made and wrote nothing to."""
 
+import os
 import runpy
 import sys
 
@@ -73,3 +74,11 @@ def test_a_folder_that_was_there_stays_and_keeps_its_files(tmp_path, monkeypatch
     for name in ("empty", "full", "full/new"):
         assert fails(monkeypatch, "place", tmp_path / NONE, "-o", tmp_path / name) == "1"
     assert sorted(path.name for path in tmp_path.rglob("*")) == ["empty", "full", "mine.txt"]
+
+
+@pytest.mark.skipif(os.sep == "\\", reason="a backslash is a separator there")
+def test_a_folder_whose_name_blender_cannot_read_is_refused(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert fails(monkeypatch, "place", NONE, "-o", "back\\slash/out") == "1"
+    assert "has a backslash in its path" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []

@@ -93,5 +93,5 @@ def test_it_writes_a_result_and_says_what_traffic_hides(small_scene, tmp_path, c
     assert "in traffic, on average over 4 instants" in notes[0]
     said = capsys.readouterr().out
     assert "chosen for the empty road: " in said
-    assert "vehicles of one run within 1 m of one of another at the same instant: " in said
+    assert "of the vehicles of one run are within 1 m of one of another at the same instant (" in said
     assert any(note.startswith("this placement sees ") and note in said for note in notes)

@@ -1,4 +1,7 @@
-"""Target points: a uniform grid on the road surface inside the region of interest."""
+"""Target points: a uniform grid on the road surface inside the region of interest.
+
+`tests/core/site/test_targets.py` shows its use.
+"""
 
 from __future__ import annotations
 

@@ -97,8 +97,10 @@ def check_folder(folder: Path) -> tuple[Path, ...]:
     Raises
     ------
     SeipError
-        The folder cannot be created or written.
+        The folder cannot be created or written, or Blender cannot read its name.
     """
+    if "\\" in str(folder.absolute()) and os.sep == "/":
+        raise SeipError(f"{folder} has a backslash in its path, which Blender takes for a slash: choose another folder")
     with _writing(folder):
         made = _make_folder(folder)
         try:

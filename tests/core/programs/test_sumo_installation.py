@@ -90,7 +90,7 @@ PROGRAMS = Sumo(PYTHON, PYTHON, None)
 def test_a_program_ends_with_the_run_that_started_it(tmp_path):
     mark = tmp_path / "mark"
     script = f"import pathlib, time\nmark = pathlib.Path({str(mark)!r})\nmark.touch()\ntime.sleep(2)\nmark.unlink()"
-    steps = run(PROGRAMS, PYTHON, ["-c", script], "waiting")
+    steps = run(PROGRAMS, PYTHON, ["-c", script], "waiting", tmp_path)
     while not mark.exists():
         next(steps)
     steps.close()
@@ -98,10 +98,11 @@ def test_a_program_ends_with_the_run_that_started_it(tmp_path):
     assert mark.exists()
 
 
-def test_a_program_that_fails_is_named_with_its_reason():
+def test_a_program_that_fails_is_named_with_its_reason(tmp_path):
     script = "import sys; sys.exit('Error: Nothing to do.')"
     with pytest.raises(SeipError, match="failed: Nothing to do; check the map"):
-        finish(run(PROGRAMS, PYTHON, ["-c", script], "waiting"))
+        finish(run(PROGRAMS, PYTHON, ["-c", script], "waiting", tmp_path))
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.fixture
