@@ -7,13 +7,14 @@ import importlib.util
 import logging
 import sys
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from types import ModuleType
 from typing import Any
 
 from seip_addon.core.base.errors import SeipError
+from seip_addon.scene.interrupts import held_signals
 
 MEMORY = 4 << 30
 """Bytes that a worker of this machine may use: ten times what a typical site needs. Dask ends one that needs more."""
@@ -66,26 +67,17 @@ def connected(address: str | None, workers: int = 1) -> Iterator[Client]:
     """
     check_dask()
     import dask  # noqa: PLC0415 - an extra that need not be installed
-    from distributed import Client, LocalCluster  # noqa: PLC0415 - as above
+    from distributed import Client  # noqa: PLC0415 - as above
 
     if address is None:
-        # Processes that are killed leave their temporary files: those of the workers lie in a folder of this one.
-        with (
-            TemporaryDirectory(prefix="seip-", ignore_cleanup_errors=True) as folder,
-            dask.config.set({"temporary-directory": folder}),
-            _apart_from_blender(),
-            LocalCluster(
-                n_workers=workers,
-                threads_per_worker=1,
-                memory_limit=MEMORY,
-                host="127.0.0.1",
-                dashboard_address="127.0.0.1:0",
-                silence_logs=50,
-                preload=[_PRELOAD],
-                env=dict.fromkeys(("TMPDIR", "TEMP", "TMP"), folder),
-            ) as cluster,
-            Client(cluster, set_as_default=False) as client,
-        ):
+        with ExitStack() as stack:
+            # Processes that are killed leave their temporary files: those of the workers lie in a folder of this one.
+            folder = stack.enter_context(TemporaryDirectory(prefix="seip-", ignore_cleanup_errors=True))
+            stack.enter_context(dask.config.set({"temporary-directory": folder}))
+            stack.enter_context(_apart_from_blender())
+            with held_signals():  # Dask cannot close a cluster whose start was interrupted
+                cluster = stack.enter_context(_local_cluster(workers, folder))
+                client = stack.enter_context(Client(cluster, set_as_default=False))
             try:
                 yield client
             finally:
@@ -108,6 +100,22 @@ def connected(address: str | None, workers: int = 1) -> Iterator[Client]:
                 f"the Dask scheduler at {address} has no workers; start some where this package is installed"
             )
         yield client
+
+
+def _local_cluster(workers: int, folder: str) -> Any:  # noqa: ANN401 -- Dask has no types
+    """Start a cluster of processes on this machine, whose temporary files lie in a folder."""
+    from distributed import LocalCluster  # noqa: PLC0415 - an extra
+
+    return LocalCluster(
+        n_workers=workers,
+        threads_per_worker=1,
+        memory_limit=MEMORY,
+        host="127.0.0.1",
+        dashboard_address="127.0.0.1:0",
+        silence_logs=50,
+        preload=[_PRELOAD],
+        env=dict.fromkeys(("TMPDIR", "TEMP", "TMP"), folder),
+    )
 
 
 async def _close_workers(cluster: Any) -> None:  # noqa: ANN401 -- Dask has no types

@@ -98,8 +98,8 @@ def save_page(path: str | os.PathLike[str], findings: Findings) -> None:
 def _summary(findings: Findings) -> list[str]:
     versions = ", ".join(f"{name} {version}" for name, version in findings.setting["versions"].items())
     text = (
-        "Written by `make benchmark`. Seconds are processor time and depend on the machine. Ratios depend on it less: "
-        "compared methods ran in turn in one process. "
+        "Written by `make benchmark`. Seconds are processor time and depend on the machine. So do ratios, "
+        "although compared methods ran in turn in one process. "
         f"Here: {findings.setting['cores']} cores, {versions}."
     )
     rows = [
