@@ -141,7 +141,7 @@ class Evaluation:
         All-point interpolation of PASCAL VOC 2010, on all detections of all frames in one order. Equal scores make one
         point of the curve: no threshold can tell them apart.
         """
-        return float(average_precisions_of_runs(self, np.ones((1, int(self.run.max()) + 1)))[0])
+        return float(average_precisions_of_runs(self, np.ones((1, int(self.run.max(initial=0)) + 1)))[0])
 
 
 def evaluate(frames: Sequence[FrameResult], rule: Rule) -> Evaluation:
