@@ -72,10 +72,10 @@ def outlook(record: PlacementRecord) -> str:
     if objective.status == MOVED:
         return "This is not an optimised placement: the sensors are evaluated where they stand."
     what = purpose(record.notes) if record.returns is None else ""  # else the sentence before has said it
-    what += "" if record.judgement is None else " by the criterion"
     better = "cheaper" if objective.cheapest else "better"
     if objective.status == "optimal":
-        return f"It is proven that no placement of these candidates is {better}{what}."
+        return f"Proven by the criterion: no placement of these candidates is {better}{what}."
+    what += "" if record.judgement is None else " by the criterion"
     more = possible_improvement(record)
     return (
         "How much better it could be is not known."
