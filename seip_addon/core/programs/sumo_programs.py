@@ -138,5 +138,7 @@ def run(
 
 
 def _last_error(complaint: str) -> str:
-    lines = [line.removeprefix("Error:").strip() for line in complaint.splitlines() if line.startswith("Error:")]
-    return lines[0].rstrip(".") if lines else "it gave no reason"
+    """Return the first error that a program reports; without one its last line, as of a library that is missing."""
+    said = [line.strip() for line in complaint.splitlines() if line.strip()]
+    errors = [line.removeprefix("Error:").strip() for line in said if line.startswith("Error:")]
+    return next(iter(errors or said[-1:]), "it gave no reason").rstrip(".")
