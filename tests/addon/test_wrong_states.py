@@ -64,9 +64,7 @@ def test_the_panel_says_what_the_record_holds(placed, monkeypatch):
     monkeypatch.setattr(placement_panel, "draw_sentence", lambda _, text, **__: said.append(text))
     placement_panel.draw(DrawnLayout(), bpy.context)
     share = f"{record['coverage']['whole']:.1%}"
-    assert (
-        said[0] == f"{share} of the road is seen. Proven by the criterion: no placement of these candidates is better."
-    )
+    assert said[0] == f"{share} of the road is seen. By the criterion, no placement of these candidates is better."
     notes = {sentence(note) for note in record["notes"]}
     assert not notes & set(said)
     bpy.context.window_manager.seip_sections.details = True

@@ -74,7 +74,7 @@ def outlook(record: PlacementRecord) -> str:
     what = purpose(record.notes) if record.returns is None else ""  # else the sentence before has said it
     better = "cheaper" if objective.cheapest else "better"
     if objective.status == "optimal":
-        return f"Proven by the criterion: no placement of these candidates is {better}{what}."
+        return f"By the criterion, no placement of these candidates is {better}{what}."
     what += "" if record.judgement is None else " by the criterion"
     more = possible_improvement(record)
     return (

@@ -139,7 +139,7 @@ def test_the_first_page_says_where_what_how_many_what_price_and_how_good(folder)
     assert all(value.strip() for _, value in facts.rows)
     assert sum(isinstance(block, Picture) for block in report.first) == 1
     (paragraph,) = (block for block in report.first if isinstance(block, Paragraph))
-    assert paragraph.text.endswith("Proven by the criterion: no placement of these candidates is better.")
+    assert paragraph.text.endswith("By the criterion, no placement of these candidates is better.")
     assert report.subtitle.endswith("2 January 2026")
 
 

@@ -43,7 +43,7 @@ def with_returns(record, least=30.0, typical=150.0):
 def test_a_proven_placement_has_two_sentences(record):
     assert status_text(record) == "94% · $48k · proven"
     assert answer(record) == (
-        "94.4% of the road is seen. Proven by the criterion: no placement of these candidates is better.",
+        "94.4% of the road is seen. By the criterion, no placement of these candidates is better.",
         f"$48,000 for 3 sensors, about ${costs_of(record).total:,.0f} installed.",
     )
 
