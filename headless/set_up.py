@@ -21,7 +21,7 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-from headless.system_libraries import complaint, missing_libraries
+from headless.system_libraries import SUMO_PACKAGES, complaint, missing_libraries
 
 SUPPORTED_PYTHONS = ((3, 11), (3, 13))
 ROOT = Path(__file__).resolve().parent.parent
@@ -38,7 +38,7 @@ def main(arguments: list[str]) -> str | None:
     if not arguments:
         return "usage: python3 -m headless.set_up FOLDER [GROUP ...]"
     environment = Path(arguments[0])
-    trouble = what_is_missing()
+    trouble = what_is_missing(sumo="traffic" in arguments[1:])
     if trouble:
         return trouble
     stamp = environment / "set-up"
@@ -52,14 +52,14 @@ def main(arguments: list[str]) -> str | None:
     return None
 
 
-def what_is_missing() -> str | None:
+def what_is_missing(*, sumo: bool = False) -> str | None:
     """Return what this system lacks, with its cure, before anything is downloaded."""
     if sys.version_info[:2] not in SUPPORTED_PYTHONS:
         return (
             f"this is Python {sys.version_info[0]}.{sys.version_info[1]}, but Blender's module exists "
             "for Python 3.11 and 3.13 only; use one of these: make PYTHON=python3.13 ..."
         )
-    missing = missing_libraries()
+    missing = missing_libraries() | (missing_libraries(SUMO_PACKAGES) if sumo else {})
     if importlib.util.find_spec("ensurepip") is None:
         missing = {"the module ensurepip": "python3-venv", **missing}
     return complaint(missing) if missing else None

@@ -1,9 +1,10 @@
-"""The shared libraries that Blender's module expects of a Linux system, and the packages that hold them."""
+"""The shared libraries that Blender's module and SUMO expect of a Linux system, and the packages that hold them."""
 
 from __future__ import annotations
 
 import ctypes
 import sys
+from collections.abc import Mapping
 
 DEBIAN_PACKAGES = {
     "libGL.so.1": "libgl1",
@@ -17,13 +18,15 @@ DEBIAN_PACKAGES = {
     "libXrender.so.1": "libxrender1",
     "libxkbcommon.so.0": "libxkbcommon0",
 }
+SUMO_PACKAGES = {"libatomic.so.1": "libatomic1"}
+"""What Eclipse SUMO expects besides."""
 
 
-def missing_libraries() -> dict[str, str]:
-    """Return the libraries that ``import bpy`` or a render would miss here, each with its Debian package."""
+def missing_libraries(packages: Mapping[str, str] = DEBIAN_PACKAGES) -> dict[str, str]:
+    """Return the libraries that are missing here, each with its Debian package: those of ``import bpy`` and renders."""
     if not sys.platform.startswith("linux"):
         return {}
-    return {library: package for library, package in DEBIAN_PACKAGES.items() if not _loads(library)}
+    return {library: package for library, package in packages.items() if not _loads(library)}
 
 
 def complaint(missing: dict[str, str]) -> str:

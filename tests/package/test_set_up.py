@@ -44,6 +44,8 @@ def test_all_that_is_missing_comes_in_one_line(monkeypatch):
         "this system lacks the module ensurepip, libEGL.so.1, libXi.so.6; "
         "install with: apt-get install --no-install-recommends python3-venv libegl1 libxi6"
     )
+    monkeypatch.setattr(system_libraries, "_loads", lambda library: library != "libatomic.so.1")
+    assert "libatomic.so.1; " in set_up.what_is_missing(sumo=True)
 
 
 @pytest.mark.usefixtures("complete_system")
