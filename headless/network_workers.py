@@ -34,7 +34,7 @@ def check_dask() -> None:
     """Raise SeipError if Dask is not installed."""
     if importlib.util.find_spec("distributed") is None:
         raise SeipError(
-            "a scheduler needs Dask, which is not installed; install the extra 'cluster' in the project's folder: "
+            "a network needs Dask, which is not installed; install the extra 'cluster' in the project's folder: "
             "pip install '.[cluster]'"
         )
 
